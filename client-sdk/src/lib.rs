@@ -1,0 +1,1 @@
+//! What an application links: hands key frames to the daemon, never blocks, never panics.

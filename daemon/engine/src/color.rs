@@ -1,0 +1,214 @@
+//! Colour planes in canonical form: integers that may be interpolated channel by channel.
+//!
+//! [`Texel`] is the one definition of interpolation that every method uses. `rgba8` and `rgb10a2`
+//! are kept as their packed 32-bit word. A half float is kept as a monotone
+//! integer (sign-magnitude turned into an ordered `u16`), so that integer interpolation is
+//! monotone, and weight 0 gives back the very bits that came in.
+
+use crate::plane::Plane;
+
+/// How the channels of a colour plane are stored.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum ColorFormat {
+    /// Four bytes: red, green, blue, alpha in memory order.
+    #[default]
+    Rgba8,
+    /// One little-endian word: red in bits 0..10, green 10..20, blue 20..30, alpha 30..32.
+    Rgb10a2,
+    /// Four little-endian half floats: red, green, blue, alpha in memory order.
+    Rgba16f,
+}
+
+impl ColorFormat {
+    /// Bytes of one pixel.
+    #[must_use]
+    pub const fn bytes_per_pixel(self) -> u32 {
+        match self {
+            Self::Rgba8 | Self::Rgb10a2 => 4,
+            Self::Rgba16f => 8,
+        }
+    }
+}
+
+/// One pixel of [`ColorFormat::Rgba8`]: red in the lowest byte.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[repr(transparent)]
+pub struct Rgba8(pub u32);
+
+/// One pixel of [`ColorFormat::Rgb10a2`].
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[repr(transparent)]
+pub struct Rgb10a2(pub u32);
+
+/// One pixel of [`ColorFormat::Rgba16f`], each channel as [`half_to_ordered`] maps it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(transparent)]
+pub struct OrderedRgba16(pub [u16; 4]);
+
+impl Default for OrderedRgba16 {
+    /// Positive zero in every channel.
+    fn default() -> Self {
+        Self([half_to_ordered(0); 4])
+    }
+}
+
+/// A pixel whose channels are integers that may be interpolated.
+pub trait Texel: Copy + Default + PartialEq + Send + Sync + 'static {
+    /// Bilinear mean of the corners top left, top right, bottom left, bottom right, at `fx`, `fy`
+    /// in 1/256 of the way to the right and down (0 to 255). Weights are exact: each channel is
+    /// `(sum of weight * corner + 32768) >> 16`. A corner of weight 65536 comes back unchanged.
+    #[must_use]
+    fn bilinear(corners: [Self; 4], fx: u32, fy: u32) -> Self;
+
+    /// `(a * (256 - weight) + b * weight + 128) >> 8` per channel; `weight` is 0 to 256.
+    #[must_use]
+    fn mix(a: Self, b: Self, weight: u32) -> Self;
+}
+
+fn bilinear_weights(fx: u32, fy: u32) -> [u32; 4] {
+    let (gx, gy) = (256 - fx, 256 - fy);
+    [gx * gy, fx * gy, gx * fy, fx * fy]
+}
+
+/// Applies `channel` to the fields of packed words at `shifts`, each `mask` wide.
+fn packed_channels<const N: usize>(
+    words: [u32; N],
+    fields: [(u32, u32); 4],
+    channel: impl Fn([u32; N]) -> u32,
+) -> u32 {
+    fields.into_iter().fold(0, |packed, (shift, mask)| {
+        packed | (channel(words.map(|word| (word >> shift) & mask)) << shift)
+    })
+}
+
+const RGBA8_FIELDS: [(u32, u32); 4] = [(0, 0xff), (8, 0xff), (16, 0xff), (24, 0xff)];
+const RGB10A2_FIELDS: [(u32, u32); 4] = [(0, 0x3ff), (10, 0x3ff), (20, 0x3ff), (30, 0x3)];
+
+fn weigh(corners: [u32; 4], weights: [u32; 4]) -> u32 {
+    let sum: u32 = corners.into_iter().zip(weights).map(|(corner, weight)| corner * weight).sum();
+    (sum + 32768) >> 16
+}
+
+fn mix_channel([a, b]: [u32; 2], weight: u32) -> u32 {
+    (a * (256 - weight) + b * weight + 128) >> 8
+}
+
+impl Texel for Rgba8 {
+    fn bilinear(corners: [Self; 4], fx: u32, fy: u32) -> Self {
+        let weights = bilinear_weights(fx, fy);
+        Self(packed_channels(corners.map(|c| c.0), RGBA8_FIELDS, |c| weigh(c, weights)))
+    }
+
+    fn mix(a: Self, b: Self, weight: u32) -> Self {
+        Self(packed_channels([a.0, b.0], RGBA8_FIELDS, |c| mix_channel(c, weight)))
+    }
+}
+
+impl Texel for Rgb10a2 {
+    fn bilinear(corners: [Self; 4], fx: u32, fy: u32) -> Self {
+        let weights = bilinear_weights(fx, fy);
+        Self(packed_channels(corners.map(|c| c.0), RGB10A2_FIELDS, |c| weigh(c, weights)))
+    }
+
+    fn mix(a: Self, b: Self, weight: u32) -> Self {
+        Self(packed_channels([a.0, b.0], RGB10A2_FIELDS, |c| mix_channel(c, weight)))
+    }
+}
+
+impl Texel for OrderedRgba16 {
+    #[expect(clippy::cast_possible_truncation, reason = "a weighted mean of 16 bits has 16 bits")]
+    fn bilinear(corners: [Self; 4], fx: u32, fy: u32) -> Self {
+        let weights = bilinear_weights(fx, fy);
+        Self(std::array::from_fn(|channel| {
+            weigh(corners.map(|corner| u32::from(corner.0[channel])), weights) as u16
+        }))
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "a weighted mean of 16 bits has 16 bits")]
+    fn mix(a: Self, b: Self, weight: u32) -> Self {
+        Self(std::array::from_fn(|channel| {
+            mix_channel([u32::from(a.0[channel]), u32::from(b.0[channel])], weight) as u16
+        }))
+    }
+}
+
+/// A colour plane in canonical form.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum ColorPlane {
+    /// Of [`ColorFormat::Rgba8`].
+    Rgba8(Plane<Rgba8>),
+    /// Of [`ColorFormat::Rgb10a2`].
+    Rgb10a2(Plane<Rgb10a2>),
+    /// Of [`ColorFormat::Rgba16f`].
+    Rgba16f(Plane<OrderedRgba16>),
+}
+
+impl ColorPlane {
+    /// A plane of zero bits (black, transparent).
+    #[must_use]
+    pub fn new(format: ColorFormat, width: u32, height: u32) -> Self {
+        match format {
+            ColorFormat::Rgba8 => Self::Rgba8(Plane::new(width, height)),
+            ColorFormat::Rgb10a2 => Self::Rgb10a2(Plane::new(width, height)),
+            ColorFormat::Rgba16f => Self::Rgba16f(Plane::new(width, height)),
+        }
+    }
+
+    /// How the channels are stored.
+    #[must_use]
+    pub fn format(&self) -> ColorFormat {
+        match self {
+            Self::Rgba8(_) => ColorFormat::Rgba8,
+            Self::Rgb10a2(_) => ColorFormat::Rgb10a2,
+            Self::Rgba16f(_) => ColorFormat::Rgba16f,
+        }
+    }
+
+    /// Pixels per row.
+    #[must_use]
+    pub fn width(&self) -> u32 {
+        match self {
+            Self::Rgba8(plane) => plane.width(),
+            Self::Rgb10a2(plane) => plane.width(),
+            Self::Rgba16f(plane) => plane.width(),
+        }
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub fn height(&self) -> u32 {
+        match self {
+            Self::Rgba8(plane) => plane.height(),
+            Self::Rgb10a2(plane) => plane.height(),
+            Self::Rgba16f(plane) => plane.height(),
+        }
+    }
+
+    /// Appends the pixels in wire form ([`ColorFormat`], row-major, no padding) to `out`.
+    pub fn write_bytes(&self, out: &mut Vec<u8>) {
+        match self {
+            Self::Rgba8(plane) => {
+                out.extend(plane.data().iter().flat_map(|texel| texel.0.to_le_bytes()));
+            }
+            Self::Rgb10a2(plane) => {
+                out.extend(plane.data().iter().flat_map(|texel| texel.0.to_le_bytes()));
+            }
+            Self::Rgba16f(plane) => {
+                let channels = plane.data().iter().flat_map(|texel| texel.0);
+                out.extend(channels.flat_map(|ordered| ordered_to_half(ordered).to_le_bytes()));
+            }
+        }
+    }
+}
+
+/// Maps the bits of a half float to an integer of the same order: -inf lowest, +inf highest.
+#[must_use]
+pub const fn half_to_ordered(bits: u16) -> u16 {
+    if bits & 0x8000 == 0 { bits | 0x8000 } else { !bits }
+}
+
+/// Inverse of [`half_to_ordered`].
+#[must_use]
+pub const fn ordered_to_half(ordered: u16) -> u16 {
+    if ordered & 0x8000 == 0 { !ordered } else { ordered & 0x7fff }
+}

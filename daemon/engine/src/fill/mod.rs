@@ -1,0 +1,1 @@
+//! Repairs disocclusions: what no source pixel lands on.

@@ -1,0 +1,112 @@
+//! Key frames: as they arrive ([`KeyInput`]) and as the engine keeps them ([`KeyFrame`]).
+
+use crate::color::ColorPlane;
+use crate::plane::{Plane, Rect};
+use crate::time::{MonoSpan, MonoTime};
+
+/// View and projection of one key frame, unjittered, column-major, clip = projection * view * p.
+/// Every element is finite once decoded.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Camera {
+    /// World to view.
+    pub view: [f32; 16],
+    /// View to clip.
+    pub projection: [f32; 16],
+}
+
+/// One plane of a key frame, as bytes in the declared format.
+#[derive(Clone, Copy, Debug)]
+pub struct PlaneInput<'a> {
+    /// Pixels; row `y` starts at `y * stride`.
+    pub bytes: &'a [u8],
+    /// Columns of the plane.
+    pub width: u32,
+    /// Rows of the plane.
+    pub height: u32,
+    /// Bytes from one row to the next, at least `width` pixels.
+    pub stride: u32,
+    /// The part that holds the image.
+    pub valid: Rect,
+    /// Sub-pixel offset of the samples, in pixels of this plane, x right, y down: a sample of pixel
+    /// centre c shows the unjittered image at c + jitter.
+    pub jitter: [f32; 2],
+}
+
+/// A key frame as it arrives: borrowed planes in the stream's declared conventions.
+#[derive(Clone, Copy, Debug)]
+pub struct KeyInput<'a> {
+    /// Sequence number that the application counts up.
+    pub index: u64,
+    /// Simulation time that the picture shows.
+    pub content_time: MonoTime,
+    /// Content time that the motion plane points back to, whether or not that frame was submitted.
+    pub motion_from: Option<MonoTime>,
+    /// The application says that nothing before this key relates to it.
+    pub is_cut: bool,
+    /// Colour.
+    pub color: PlaneInput<'a>,
+    /// Depth, if this key has it.
+    pub depth: Option<PlaneInput<'a>>,
+    /// Motion, if this key has it.
+    pub motion: Option<PlaneInput<'a>>,
+    /// Camera at `content_time`.
+    pub camera: Option<Camera>,
+    /// Camera at `motion_from`; needed where vectors lack the camera's motion.
+    pub motion_from_camera: Option<Camera>,
+}
+
+/// Velocity of one surface point, in 1/32 pixel of the colour plane per motion span: position at
+/// the key minus position at `motion_from`. [`Velocity::UNTRACKABLE`] holds no velocity.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[repr(C)]
+pub struct Velocity {
+    /// To the right.
+    pub x: i16,
+    /// Down.
+    pub y: i16,
+}
+
+impl Velocity {
+    /// Steps per pixel.
+    pub const PER_PX: i32 = 32;
+    /// No velocity is known (NaN, or beyond +-1023 pixels): the surface is held.
+    pub const UNTRACKABLE: Self = Self { x: i16::MIN, y: i16::MIN };
+
+    /// Whether it holds a velocity.
+    #[must_use]
+    pub fn is_trackable(self) -> bool {
+        self != Self::UNTRACKABLE
+    }
+}
+
+/// A key frame in the one convention of the engine.
+#[derive(Clone, Debug)]
+pub struct KeyFrame {
+    /// Sequence number that the application counts up.
+    pub index: u64,
+    /// Simulation time that the picture shows.
+    pub content_time: MonoTime,
+    /// Content time that `velocity` points back to. None where there is no usable motion.
+    pub motion_from: Option<MonoTime>,
+    /// Nothing before this key relates to it.
+    pub is_cut: bool,
+    /// Colour, at the size of the output.
+    pub color: ColorPlane,
+    /// The part of `color` that moves; the rest is shown as it is.
+    pub valid: Rect,
+    /// Depth key per cell of the field grid, larger is nearer. Empty without a depth plane.
+    pub depth: Plane<u32>,
+    /// Dilated, quantised motion per cell of the field grid. Empty without a motion plane.
+    pub velocity: Plane<Velocity>,
+    /// Camera at `content_time`.
+    pub camera: Option<Camera>,
+}
+
+impl KeyFrame {
+    /// Time that the motion field spans; None where there is no usable motion.
+    #[must_use]
+    pub fn motion_span(&self) -> Option<MonoSpan> {
+        let span = self.content_time - self.motion_from?;
+        (span > MonoSpan::ZERO).then_some(span)
+    }
+}

@@ -1,0 +1,36 @@
+//! The Foreframe engine: extrapolates in-between frames and plans when to show which content time.
+//!
+//! Pure: bytes and times go in, pictures and plans come out. It reads no clock, opens no socket
+//! and knows no wire format, so the live daemon, the replay tool and the tests run the same code.
+//!
+//! Flow of a key frame: [`decode`] converts what the application declared to the one convention
+//! inside; [`trajectory`] dilates motion and quantises it; of an in-between frame: [`warp`]
+//! scatters or gathers along the trajectories, [`fill`] repairs what no source pixel lands on.
+//! [`engine`] runs these steps in order, [`pacing`] says for which content time.
+//!
+//! Everything after the trajectory is integer arithmetic, so that one input gives one output on
+//! every machine and for any number of threads.
+
+pub mod color;
+pub mod decode;
+pub mod engine;
+pub mod fill;
+pub mod format;
+pub mod key;
+pub mod method;
+pub mod pacing;
+pub mod phase;
+pub mod plane;
+pub mod time;
+pub mod trajectory;
+pub mod warp;
+
+pub use color::ColorPlane;
+pub use decode::DecodeError;
+pub use engine::{Engine, EngineConfig, FrameReport, KeyReport};
+pub use format::StreamFormat;
+pub use key::{Camera, KeyFrame, KeyInput, PlaneInput};
+pub use method::Method;
+pub use phase::Phase;
+pub use plane::{Plane, Rect};
+pub use time::{MonoSpan, MonoTime};

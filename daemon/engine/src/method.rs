@@ -1,0 +1,68 @@
+//! The synthesis methods that users can name.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// How an in-between frame is made.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
+pub enum Method {
+    /// Nothing moves: the newest key again.
+    Hold,
+    /// Mean of the two keys around the content time. Interpolates.
+    Blend,
+    /// The newest key sampled backwards through its own motion field: the plain baseline.
+    Gather,
+    /// Grid warp snapped to motion discontinuities (Didyk et al. 2010, section 6).
+    Grid,
+    /// Scatter of depth and source offset along the motion field, then a gather of colour.
+    #[default]
+    Linear,
+}
+
+impl Method {
+    /// Every method, in the order in which tables list them.
+    pub const ALL: [Self; 5] = [Self::Hold, Self::Blend, Self::Gather, Self::Grid, Self::Linear];
+
+    /// Name on the command line, in reports and in JSON.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Hold => "hold",
+            Self::Blend => "blend",
+            Self::Gather => "gather",
+            Self::Grid => "grid",
+            Self::Linear => "linear",
+        }
+    }
+
+    /// Whether it needs the key after the content time, and so shows everything one interval late.
+    #[must_use]
+    pub const fn interpolates(self) -> bool {
+        matches!(self, Self::Blend)
+    }
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// A method name that does not exist.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("expected one of hold, blend, gather, grid, linear, found `{found}`")]
+pub struct UnknownMethod {
+    /// What was asked for.
+    pub found: String,
+}
+
+impl FromStr for Method {
+    type Err = UnknownMethod;
+
+    fn from_str(name: &str) -> Result<Self, UnknownMethod> {
+        Self::ALL
+            .into_iter()
+            .find(|method| method.name() == name)
+            .ok_or_else(|| UnknownMethod { found: name.to_owned() })
+    }
+}

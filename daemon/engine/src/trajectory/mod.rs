@@ -1,0 +1,1 @@
+//! From decoded planes to quantised trajectories: dilation and quantisation of motion.

@@ -1,0 +1,1 @@
+//! The daemon: sessions, engine threads, sinks, recorder. The only place with clocks, sockets and logs.

@@ -1,0 +1,2 @@
+//! The daemon on its own.
+fn main() {}

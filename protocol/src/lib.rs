@@ -1,0 +1,1 @@
+//! Wire types, handshake, shared-memory planes and fd passing. PROTOCOL.md is normative.

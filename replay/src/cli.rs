@@ -1,0 +1,73 @@
+//! Every command and its options, defined once.
+
+use clap::{Parser, Subcommand};
+
+use crate::commands::{
+    completions, demo, export, import, info, man, pacing, replay, scenes, score, serve,
+};
+use crate::output::Output;
+
+/// Makes a 40-60 Hz application look like 120 Hz and more.
+///
+/// Start with `foreframe demo`: it needs no GPU, no display and no configuration.
+#[derive(Parser, Debug)]
+#[command(name = "foreframe", version, propagate_version = true, max_term_width = 100)]
+#[command(after_help = "Exit codes: 0 done, 1 failed or found wanting, 2 wrong usage.")]
+pub struct Cli {
+    /// Print one JSON object on standard output instead of text.
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands.
+#[derive(Subcommand, Debug)]
+pub enum Command {
+    /// Show what Foreframe does: a scene at 40 Hz through a real daemon, out at 120 Hz.
+    Demo(demo::Args),
+    /// Run the daemon (the same as `foreframed`).
+    Serve(serve::Args),
+    /// List the built-in scenes, or write one as a capture.
+    Scenes(scenes::Args),
+    /// Turn a folder of EXR frames and JSON side-cars into a capture.
+    Import(import::Args),
+    /// Turn a capture into a folder of EXR frames and JSON side-cars.
+    Export(export::Args),
+    /// Say what a capture holds and whether it is whole.
+    Info(info::Args),
+    /// Feed a capture through the engine and the pacer, on virtual time.
+    Replay(replay::Args),
+    /// Predict left-out frames of captures and measure how far off the methods are.
+    Score(score::Args),
+    /// Run the pacer against a simulated display and clock.
+    Pacing(pacing::Args),
+    /// Print a shell completion script.
+    Completions(completions::Args),
+    /// Write the man pages.
+    Man(man::Args),
+}
+
+impl Cli {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// What was expected, what was found, and what to do, as a chain of contexts.
+    pub fn run(self) -> anyhow::Result<()> {
+        let output = Output::new(self.json);
+        match self.command {
+            Command::Demo(args) => demo::run(&args, &output),
+            Command::Serve(args) => serve::run(args, &output),
+            Command::Scenes(args) => scenes::run(&args, &output),
+            Command::Import(args) => import::run(&args, &output),
+            Command::Export(args) => export::run(&args, &output),
+            Command::Info(args) => info::run(&args, &output),
+            Command::Replay(args) => replay::run(&args, &output),
+            Command::Score(args) => score::run(&args, &output),
+            Command::Pacing(args) => pacing::run(&args, &output),
+            Command::Completions(args) => completions::run(&args),
+            Command::Man(args) => man::run(&args, &output),
+        }
+    }
+}

@@ -1,0 +1,15 @@
+//! `foreframe demo`.
+
+use crate::output::Output;
+
+/// Arguments of `foreframe demo`.
+#[derive(clap::Args, Debug)]
+pub struct Args {}
+
+/// Runs the command.
+///
+/// # Errors
+/// Always, until it exists.
+pub fn run(_args: &Args, _output: &Output) -> anyhow::Result<()> {
+    anyhow::bail!("demo does not exist yet")
+}

@@ -1,0 +1,13 @@
+//! One module per command: `Args` (what was typed) and `run` (read, call, report).
+
+pub mod completions;
+pub mod demo;
+pub mod export;
+pub mod import;
+pub mod info;
+pub mod man;
+pub mod pacing;
+pub mod replay;
+pub mod scenes;
+pub mod score;
+pub mod serve;

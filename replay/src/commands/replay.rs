@@ -1,0 +1,15 @@
+//! `foreframe replay`.
+
+use crate::output::Output;
+
+/// Arguments of `foreframe replay`.
+#[derive(clap::Args, Debug)]
+pub struct Args {}
+
+/// Runs the command.
+///
+/// # Errors
+/// Always, until it exists.
+pub fn run(_args: &Args, _output: &Output) -> anyhow::Result<()> {
+    anyhow::bail!("replay does not exist yet")
+}

@@ -1,0 +1,9 @@
+//! The `foreframe` tool: demo, record and replay, import and export, score.
+//!
+//! [`cli`] defines every command and option once; shell completions and man pages are made from
+//! the same definitions. Each module in [`commands`] owns one command and does no more than read
+//! its arguments, call a library, and report.
+
+pub mod cli;
+pub mod commands;
+pub mod output;
