@@ -1,1 +1,5 @@
 //! The daemon: sessions, engine threads, sinks, recorder. The only place with clocks, sockets and logs.
+
+pub mod clock;
+pub mod config;
+pub mod sink;

@@ -1,0 +1,346 @@
+//! What the daemon was told: flags, and a TOML file with the same names.
+//!
+//! [`Args`] is both: clap reads it from the command line, serde from the file. A flag wins over the
+//! file. [`Config`] is what the two together mean, with every default filled in and every value
+//! checked; nothing else in the daemon looks at [`Args`].
+
+use std::fmt;
+use std::fs;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use anyhow::{Context as _, bail, ensure};
+use foreframe_engine::{Method, MonoSpan};
+use serde::{Deserialize, Deserializer};
+
+/// Arguments of `foreframed` and of `foreframe serve`.
+#[derive(clap::Args, Deserialize, Clone, Debug, Default)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Args {
+    /// Socket to listen on [default: foreframe/foreframe-0 in XDG_RUNTIME_DIR]
+    #[arg(long, value_name = "PATH")]
+    pub socket: Option<PathBuf>,
+    /// Where output frames go: null, shm, png:DIR, y4m:PATH, or - for y4m on standard output
+    /// [default: shm]
+    #[arg(long)]
+    pub sink: Option<SinkSpec>,
+    /// Refresh rate of the output, 1 to 1000 [default: 120]
+    #[arg(long, value_name = "HZ")]
+    pub refresh: Option<f64>,
+    /// What the engine runs on: auto or cpu [default: auto]
+    #[arg(long)]
+    pub backend: Option<Backend>,
+    /// How in-between frames are made: hold, blend, gather, grid or linear [default: linear]
+    #[arg(long)]
+    #[serde(default, deserialize_with = "from_name")]
+    pub method: Option<Method>,
+    /// Record what the applications send into this capture
+    #[arg(long, value_name = "FILE")]
+    pub record: Option<PathBuf>,
+    /// Threads that share the work of one stream [default: as many as there are processors]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+    /// Pixels per degree of visual angle; turns on damping of motion that no eye can follow
+    #[arg(long, value_name = "N")]
+    pub ppd: Option<f32>,
+    /// What to log on standard error: error, warn, info, debug, trace, or a filter such as
+    /// foreframed::session=debug [default: info]
+    #[arg(long, value_name = "LEVEL")]
+    pub log: Option<String>,
+    /// Clients that may be connected at once [default: 16]
+    #[arg(long, value_name = "N")]
+    pub max_clients: Option<usize>,
+    /// Memory that the streams of one client may cost, in MiB [default: 2048]
+    #[arg(long, value_name = "N")]
+    pub memory_mb: Option<u64>,
+    /// TOML file with the same names as these options; an option given here wins
+    #[arg(long, value_name = "FILE")]
+    #[serde(skip)]
+    pub config: Option<PathBuf>,
+}
+
+/// Where output frames go.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub enum SinkSpec {
+    /// Frames are made and thrown away. Nobody can subscribe.
+    Null,
+    /// Subscribers get the frames in shared memory, and nobody else.
+    #[default]
+    Shm,
+    /// `frame_000000.png` and so on in this folder.
+    Png(PathBuf),
+    /// A y4m stream in this file or pipe.
+    Y4m(PathBuf),
+    /// A y4m stream on standard output.
+    Y4mStdout,
+}
+
+impl FromStr for SinkSpec {
+    type Err = String;
+
+    fn from_str(spec: &str) -> Result<Self, String> {
+        match spec.split_once(':') {
+            Some(("png", dir)) if !dir.is_empty() => Ok(Self::Png(dir.into())),
+            Some(("y4m", "-")) => Ok(Self::Y4mStdout),
+            Some(("y4m", path)) if !path.is_empty() => Ok(Self::Y4m(path.into())),
+            None if spec == "null" => Ok(Self::Null),
+            None if spec == "shm" => Ok(Self::Shm),
+            None if spec == "-" => Ok(Self::Y4mStdout),
+            _ => Err(format!("expected null, shm, png:DIR, y4m:PATH or -, found `{spec}`")),
+        }
+    }
+}
+
+impl fmt::Display for SinkSpec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Null => f.write_str("null"),
+            Self::Shm => f.write_str("shm"),
+            Self::Png(dir) => write!(f, "png:{}", dir.display()),
+            Self::Y4m(path) => write!(f, "y4m:{}", path.display()),
+            Self::Y4mStdout => f.write_str("-"),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for SinkSpec {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        String::deserialize(deserializer)?.parse().map_err(serde::de::Error::custom)
+    }
+}
+
+/// What the engine runs on.
+#[derive(clap::ValueEnum, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[serde(rename_all = "kebab-case")]
+pub enum Backend {
+    /// The best that this machine has.
+    #[default]
+    Auto,
+    /// The processor.
+    Cpu,
+}
+
+fn from_name<'de, D, T>(deserializer: D) -> Result<Option<T>, D::Error>
+where
+    D: Deserializer<'de>,
+    T: FromStr<Err: fmt::Display>,
+{
+    let name = String::deserialize(deserializer)?;
+    name.parse().map(Some).map_err(serde::de::Error::custom)
+}
+
+/// Everything the daemon needs to know, checked.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Config {
+    /// Where to listen; None for the place that clients look at first.
+    pub socket: Option<PathBuf>,
+    /// Where output frames go.
+    pub sink: SinkSpec,
+    /// Period of the output.
+    pub refresh_interval: MonoSpan,
+    /// What the engine runs on.
+    pub backend: Backend,
+    /// How in-between frames are made.
+    pub method: Method,
+    /// Capture to write.
+    pub record: Option<PathBuf>,
+    /// Threads per stream.
+    pub threads: NonZeroUsize,
+    /// Angular size of a pixel, which turns on damping.
+    pub pixels_per_degree: Option<f32>,
+    /// Filter of the log.
+    pub log: String,
+    /// Clients at once.
+    pub max_clients: usize,
+    /// Bytes that the pools and the engines of one client may take.
+    pub memory_per_client: u64,
+}
+
+impl Args {
+    /// Reads the file that `--config` names, fills in the defaults and checks every value.
+    ///
+    /// # Errors
+    /// If the file cannot be read or holds an unknown name, or a value is out of its range.
+    pub fn resolve(self) -> anyhow::Result<Config> {
+        let args = match &self.config {
+            Some(path) => {
+                let file = read_file(path)?;
+                self.or(file)
+            }
+            None => self,
+        };
+        args.check()
+    }
+
+    /// These values, and where there is none the one of `file`.
+    fn or(self, file: Self) -> Self {
+        Self {
+            socket: self.socket.or(file.socket),
+            sink: self.sink.or(file.sink),
+            refresh: self.refresh.or(file.refresh),
+            backend: self.backend.or(file.backend),
+            method: self.method.or(file.method),
+            record: self.record.or(file.record),
+            threads: self.threads.or(file.threads),
+            ppd: self.ppd.or(file.ppd),
+            log: self.log.or(file.log),
+            max_clients: self.max_clients.or(file.max_clients),
+            memory_mb: self.memory_mb.or(file.memory_mb),
+            config: self.config,
+        }
+    }
+
+    fn check(self) -> anyhow::Result<Config> {
+        let refresh = self.refresh.unwrap_or(120.0);
+        ensure!(
+            (1.0..=1000.0).contains(&refresh),
+            "--refresh: expected 1 to 1000 Hz, found {refresh}"
+        );
+        if let Some(ppd) = self.ppd {
+            ensure!(
+                (1.0..=1000.0).contains(&ppd),
+                "--ppd: expected 1 to 1000 pixels per degree, found {ppd}"
+            );
+        }
+        let max_clients = self.max_clients.unwrap_or(16);
+        ensure!(
+            (1..=256).contains(&max_clients),
+            "--max-clients: expected 1 to 256, found {max_clients}"
+        );
+        let memory_mb = self.memory_mb.unwrap_or(2048);
+        ensure!(
+            (1..=1 << 20).contains(&memory_mb),
+            "--memory-mb: expected 1 to 1048576, found {memory_mb}"
+        );
+        let processors = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
+        Ok(Config {
+            socket: self.socket,
+            sink: self.sink.unwrap_or_default(),
+            refresh_interval: MonoSpan::from_hz(refresh),
+            backend: self.backend.unwrap_or_default(),
+            method: self.method.unwrap_or_default(),
+            record: self.record,
+            threads: self.threads.unwrap_or(processors),
+            pixels_per_degree: self.ppd,
+            log: self.log.unwrap_or_else(|| "info".to_owned()),
+            max_clients,
+            memory_per_client: memory_mb << 20,
+        })
+    }
+}
+
+fn read_file(path: &Path) -> anyhow::Result<Args> {
+    let text = fs::read_to_string(path)
+        .with_context(|| format!("reading the configuration {}", path.display()))?;
+    match toml::from_str(&text) {
+        Ok(args) => Ok(args),
+        Err(error) => {
+            let start = error.span().map_or(0, |span| span.start.min(text.len()));
+            let line = text.as_bytes()[..start].iter().filter(|&&byte| byte == b'\n').count() + 1;
+            bail!("{}, line {line}: {}", path.display(), error.message().replace('\n', ", "))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write as _;
+
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser, Debug)]
+    struct Command {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    fn flags(line: &str) -> Args {
+        Command::parse_from(std::iter::once("foreframed").chain(line.split_whitespace())).args
+    }
+
+    fn with_file(line: &str, toml: &str) -> anyhow::Result<Config> {
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        file.write_all(toml.as_bytes()).unwrap();
+        Args { config: Some(file.path().to_owned()), ..flags(line) }.resolve()
+    }
+
+    /// Every option with a value that is not its default, by the name that flag and file share.
+    const EVERY_OPTION: [(&str, &str, &str); 11] = [
+        ("socket", "/run/x", "'/run/x'"),
+        ("sink", "png:out", "'png:out'"),
+        ("refresh", "144", "144"),
+        ("backend", "cpu", "'cpu'"),
+        ("method", "hold", "'hold'"),
+        ("record", "a.mcap", "'a.mcap'"),
+        ("threads", "3", "3"),
+        ("ppd", "56", "56"),
+        ("log", "trace", "'trace'"),
+        ("max-clients", "2", "2"),
+        ("memory-mb", "64", "64"),
+    ];
+
+    #[test]
+    fn every_option_means_the_same_in_the_file_as_on_the_command_line() {
+        let default = flags("").resolve().unwrap();
+        for (name, on_line, in_file) in EVERY_OPTION {
+            let from_flag = flags(&format!("--{name} {on_line}")).resolve().unwrap();
+            let from_file = with_file("", &format!("{name} = {in_file}")).unwrap();
+            assert_eq!(from_flag, from_file, "{name}");
+            assert_ne!(from_flag, default, "{name} has no effect");
+        }
+    }
+
+    #[test]
+    fn the_table_of_options_is_complete() {
+        use clap::CommandFactory as _;
+        let command = Command::command();
+        let mut names: Vec<_> =
+            command.get_arguments().map(|argument| argument.get_id().as_str()).collect();
+        names.retain(|name| !["config", "help"].contains(name));
+        let table: Vec<_> = EVERY_OPTION.map(|(name, ..)| name.replace('-', "_")).into();
+        assert_eq!(names, table);
+    }
+
+    #[test]
+    fn a_flag_wins_over_the_file() {
+        let config = with_file("--refresh 60", "refresh = 144\nmethod = 'grid'").unwrap();
+        assert_eq!(config.refresh_interval, MonoSpan::from_hz(60.0));
+        assert_eq!(config.method, Method::Grid);
+    }
+
+    #[test]
+    fn an_unknown_name_in_the_file_is_named_with_its_line() {
+        let error = with_file("", "refresh = 60\nsinc = 'null'").unwrap_err().to_string();
+        assert!(error.contains("line 2") && error.contains("`sinc`"), "{error}");
+        assert_eq!(error.lines().count(), 1, "{error}");
+    }
+
+    #[test]
+    fn values_out_of_range_say_what_was_expected_and_found() {
+        for (line, found) in [
+            ("--refresh 0", "found 0"),
+            ("--refresh nan", "found NaN"),
+            ("--refresh 1001", "found 1001"),
+            ("--ppd 0", "found 0"),
+            ("--max-clients 0", "found 0"),
+            ("--memory-mb 0", "found 0"),
+        ] {
+            let error = flags(line).resolve().unwrap_err().to_string();
+            assert!(error.contains("expected") && error.contains(found), "{line}: {error}");
+        }
+    }
+
+    #[test]
+    fn sinks_read_back_what_they_print() {
+        for spec in ["null", "shm", "png:a/b", "y4m:x.y4m", "-"] {
+            assert_eq!(spec.parse::<SinkSpec>().unwrap().to_string(), spec);
+        }
+        for spec in ["", "png", "png:", "y4m:", "window", "shm:x"] {
+            let error = spec.parse::<SinkSpec>().unwrap_err();
+            assert!(error.contains(&format!("found `{spec}`")), "{error}");
+        }
+    }
+}

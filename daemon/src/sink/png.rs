@@ -1,0 +1,67 @@
+//! A folder of numbered PNG files: `frame_000000.png` and so on, 8-bit sRGB.
+//!
+//! The number is that of the output frame, so a frame that was dropped leaves a gap.
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter};
+use std::path::{Path, PathBuf};
+
+use foreframe_engine::{ColorPlane, StreamFormat};
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder as _};
+
+use super::srgb::SrgbConverter;
+
+/// Writes frames into one folder.
+#[derive(Debug)]
+pub struct PngSink {
+    dir: PathBuf,
+    converter: SrgbConverter,
+    rgb: Vec<u8>,
+}
+
+impl PngSink {
+    /// Makes the folder, if it is not there.
+    ///
+    /// # Errors
+    /// If it cannot be made.
+    pub fn create(dir: &Path, format: &StreamFormat) -> io::Result<Self> {
+        fs::create_dir_all(dir)?;
+        Ok(Self { dir: dir.to_owned(), converter: SrgbConverter::new(format), rgb: Vec::new() })
+    }
+
+    /// Writes output frame number `index`.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write(&mut self, index: u64, frame: &ColorPlane) -> io::Result<()> {
+        self.converter.convert(frame, &mut self.rgb);
+        let file = File::create(self.dir.join(format!("frame_{index:06}.png")))?;
+        // The cheapest settings that still compress: a sink has to keep up with the display.
+        PngEncoder::new_with_quality(BufWriter::new(file), CompressionType::Fast, FilterType::Sub)
+            .write_image(&self.rgb, frame.width(), frame.height(), ExtendedColorType::Rgb8)
+            .map_err(io::Error::other)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use foreframe_engine::Plane;
+    use foreframe_engine::color::Rgba8;
+
+    use super::*;
+
+    #[test]
+    fn a_written_file_reads_back_exactly() {
+        let dir = tempfile::tempdir().unwrap();
+        let format = StreamFormat::rgba8(5, 3);
+        let texels: Vec<_> = (0..15_u32).map(|i| Rgba8(i * 0x0001_0f03)).collect();
+        let frame = ColorPlane::Rgba8(Plane::from_vec(5, 3, texels.clone()));
+        let mut sink = PngSink::create(&dir.path().join("made"), &format).unwrap();
+        sink.write(42, &frame).unwrap();
+        let image = image::open(dir.path().join("made/frame_000042.png")).unwrap().into_rgb8();
+        let expected: Vec<u8> =
+            texels.iter().flat_map(|texel| texel.0.to_le_bytes()[..3].to_vec()).collect();
+        assert_eq!((image.width(), image.height(), image.into_raw()), (5, 3, expected));
+    }
+}
