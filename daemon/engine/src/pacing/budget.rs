@@ -1,0 +1,108 @@
+//! How long before a refresh work has to start: the work itself, and a margin for the hand-over.
+//!
+//! Work is the 95th percentile of recent frames, counted from the planned wake, so that late
+//! scheduling counts as work. The margin widens at once after a miss and shrinks slowly.
+
+use super::recent::Recent;
+use crate::time::MonoSpan;
+
+/// Frames that the work estimate looks back on: half a second at 120 Hz.
+const WORK_WINDOW: usize = 64;
+/// A twentieth of the frames may take longer than planned and live off the margin.
+const WORK_PERCENTILE: usize = 95;
+/// Margin that is never given up, for the hand-over itself.
+const MARGIN_FLOOR: MonoSpan = MonoSpan::from_us(250);
+/// A miss widens the margin by at least this.
+const MARGIN_STEP: MonoSpan = MonoSpan::from_us(500);
+/// Each good frame shrinks the margin by 1/50 = 2 % of what is above the floor.
+const MARGIN_DECAY_DIVISOR: i64 = 50;
+
+/// How long synthesis is expected to take.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum WorkEstimate {
+    /// Learned from [`Pacer::on_work`](super::Pacer::on_work).
+    Measured,
+    /// Always this, so that plans repeat exactly.
+    Constant(MonoSpan),
+}
+
+/// What has to happen before a refresh, and how long it takes.
+#[derive(Clone, Debug)]
+pub(super) struct Budget {
+    estimate: WorkEstimate,
+    work: Recent<WORK_WINDOW>,
+    margin: MonoSpan,
+}
+
+impl Budget {
+    pub(super) fn new(estimate: WorkEstimate) -> Self {
+        Self { estimate, work: Recent::default(), margin: MARGIN_FLOOR }
+    }
+
+    /// Time from wake to hand-over. A quarter of a refresh before anything was measured.
+    pub(super) fn work(&self, refresh_interval: MonoSpan) -> MonoSpan {
+        match self.estimate {
+            WorkEstimate::Constant(work) => work.max(MonoSpan::ZERO),
+            WorkEstimate::Measured => {
+                self.work.percentile(WORK_PERCENTILE).unwrap_or(refresh_interval.scale(1, 4))
+            }
+        }
+    }
+
+    /// Time from hand-over to refresh, at most half a refresh.
+    pub(super) fn margin(&self, refresh_interval: MonoSpan) -> MonoSpan {
+        self.margin.min(refresh_interval.scale(1, 2))
+    }
+
+    pub(super) fn on_work(&mut self, work: MonoSpan) {
+        self.work.push(work.max(MonoSpan::ZERO));
+    }
+
+    pub(super) fn on_good(&mut self) {
+        self.margin -= (self.margin - MARGIN_FLOOR).scale(1, MARGIN_DECAY_DIVISOR);
+    }
+
+    pub(super) fn on_miss(&mut self, refresh_interval: MonoSpan) {
+        let widened = self.margin + MARGIN_STEP.max(self.margin.scale(1, 2));
+        self.margin = widened.min(refresh_interval.scale(1, 2)).max(MARGIN_FLOOR);
+    }
+
+    pub(super) fn verify_invariants(&self) {
+        assert!(self.margin >= MARGIN_FLOOR, "margin below its floor: {self:?}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const REFRESH: MonoSpan = MonoSpan::from_ms(8);
+
+    #[test]
+    fn one_spike_in_a_window_does_not_move_the_estimate_but_many_do() {
+        let mut budget = Budget::new(WorkEstimate::Measured);
+        assert_eq!(budget.work(REFRESH), MonoSpan::from_ms(2));
+        (0..WORK_WINDOW).for_each(|_| budget.on_work(MonoSpan::from_ms(3)));
+        budget.on_work(MonoSpan::from_ms(30));
+        assert_eq!(budget.work(REFRESH), MonoSpan::from_ms(3));
+        (0..5).for_each(|_| budget.on_work(MonoSpan::from_ms(5)));
+        assert_eq!(budget.work(REFRESH), MonoSpan::from_ms(5));
+    }
+
+    #[test]
+    fn the_margin_widens_at_once_shrinks_slowly_and_stays_in_bounds() {
+        let mut budget = Budget::new(WorkEstimate::Constant(MonoSpan::ZERO));
+        let floor = budget.margin(REFRESH);
+        budget.on_miss(REFRESH);
+        let widened = budget.margin(REFRESH);
+        assert!(widened >= floor + MARGIN_STEP);
+        budget.on_good();
+        let shrunk = budget.margin(REFRESH);
+        assert!(shrunk < widened && shrunk > widened.scale(97, 100), "{shrunk:?}");
+        (0..50).for_each(|_| budget.on_miss(REFRESH));
+        assert_eq!(budget.margin(REFRESH), REFRESH.scale(1, 2));
+        (0..2_000).for_each(|_| budget.on_good());
+        assert!(budget.margin(REFRESH) <= floor + MonoSpan::from_us(1));
+        budget.verify_invariants();
+    }
+}

@@ -1,0 +1,102 @@
+//! Learns how often keys come and when the next one is overdue.
+//!
+//! A key is late when content time has run farther ahead of its predecessor than it usually has by
+//! the time that the successor can be shown. That one number, first refresh of a key minus the
+//! content time of the key before, holds the key interval, the jitter of content times and the
+//! jitter of arrivals together. Statistics are ranks, so that the late and missing keys which they
+//! are there to detect do not move them.
+
+use super::easing::Easing;
+use super::recent::Recent;
+use crate::time::{MonoSpan, MonoTime};
+
+/// Keys that the interval looks back on. Half of them follow a new rate within 0.4 s at 40 Hz.
+const INTERVAL_WINDOW: usize = 32;
+/// Keys that the learned jitter looks back on.
+const GAP_WINDOW: usize = 64;
+/// Velocity stays full for at most this many key intervals, in halves, however wild the jitter;
+/// with the rest of the easing that keeps the phase below 4.
+const LONGEST_LEAD_HALVES: i64 = 5;
+
+/// When keys come.
+#[derive(Clone, Debug, Default)]
+pub(super) struct KeyCadence {
+    previous: Option<MonoTime>,
+    intervals: Recent<INTERVAL_WINDOW>,
+    gaps: Recent<GAP_WINDOW>,
+}
+
+impl KeyCadence {
+    /// A key with `content_time` has arrived; `first_refresh` is the first that can show it.
+    pub(super) fn on_key(&mut self, content_time: MonoTime, first_refresh: MonoTime) {
+        if let Some(previous) = self.previous.filter(|&previous| previous < content_time) {
+            self.intervals.push(content_time - previous);
+            self.gaps.push(first_refresh - previous);
+        }
+        self.previous = Some(content_time);
+    }
+
+    /// The application's clock was stepped: gaps measured across the step mean nothing.
+    pub(super) fn on_clock_step(&mut self, content_time: MonoTime) {
+        self.previous = Some(content_time);
+        self.gaps.clear();
+    }
+
+    /// Usual content time from one key to the next. None before the second key.
+    pub(super) fn interval(&self) -> Option<MonoSpan> {
+        self.intervals.percentile(50)
+    }
+
+    /// How content time may run ahead of a key while present time is `delay` ahead of it.
+    pub(super) fn easing(&self, delay: MonoSpan) -> Easing {
+        let Some(interval) = self.interval() else { return Easing::HOLD };
+        let usual = match (self.gaps.percentile(50), self.gaps.percentile(90)) {
+            // The 90th percentile, and as much again as half its distance from the middle.
+            (Some(middle), Some(high)) => high + (high - middle).scale(1, 2) - delay,
+            _ => interval,
+        };
+        let longest = interval.scale(LONGEST_LEAD_HALVES, 2);
+        Easing::after(usual.clamp(interval, longest), interval)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ms(ms: u64) -> MonoTime {
+        MonoTime::from_ns(ms * 1_000_000)
+    }
+
+    #[test]
+    fn one_key_alone_is_held() {
+        let mut cadence = KeyCadence::default();
+        cadence.on_key(ms(100), ms(108));
+        assert_eq!(cadence.easing(MonoSpan::from_ms(8)), Easing::HOLD);
+    }
+
+    #[test]
+    fn late_and_missing_keys_do_not_move_what_is_usual() {
+        let mut cadence = KeyCadence::default();
+        for key in 0..64 {
+            if key % 16 != 3 {
+                let late = if key % 16 == 9 { 60 } else { 0 };
+                cadence.on_key(ms(key * 25), ms(key * 25 + 8 + late));
+            }
+        }
+        assert_eq!(cadence.interval(), Some(MonoSpan::from_ms(25)));
+        let easing = cadence.easing(MonoSpan::from_ms(8));
+        assert_eq!(easing.full_until, MonoSpan::from_ms(25));
+    }
+
+    #[test]
+    fn jitter_of_arrivals_postpones_the_overdue_instant() {
+        let mut cadence = KeyCadence::default();
+        for key in 0..64 {
+            cadence.on_key(ms(key * 25), ms(key * 25 + 8 + (key * 7) % 11));
+        }
+        let easing = cadence.easing(MonoSpan::from_ms(8));
+        assert!(easing.full_until >= MonoSpan::from_ms(34), "{easing:?}");
+        assert!(easing.full_until <= MonoSpan::from_ms(40), "{easing:?}");
+    }
+}

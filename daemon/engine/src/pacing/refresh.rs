@@ -1,0 +1,129 @@
+//! Tracks the display's refresh interval and phase from presentation feedback.
+//!
+//! An alpha-beta filter: a timestamp t is compared with the nearest predicted refresh p, and
+//! p += ALPHA (t - p), interval += BETA (t - p) / refreshes since the last timestamp. A frame that
+//! was shown whole refreshes late therefore does not disturb the grid. Timestamps far from the
+//! grid are distrusted until several in a row say so; the interval stays near the announced one.
+
+use crate::time::{MonoSpan, MonoTime};
+
+/// Fraction bits of the instants and intervals inside: at 1 ns, the rounding of one interval
+/// would add up to a refresh within weeks.
+const FRACTION: u32 = 16;
+/// Gain of the phase, as a divisor. At 8, timestamp noise is damped to a quarter.
+const ALPHA_DIVISOR: i128 = 8;
+/// Gain of the interval, as a divisor: near alpha^2 / (2 - alpha), which just does not overshoot.
+const BETA_DIVISOR: i128 = 128;
+/// A timestamp farther from the grid than this share of the interval is an outlier, in percent.
+const GATE_PERCENT: i128 = 35;
+/// So many outliers in a row mean that the grid has moved, not the timestamps.
+const OUTLIERS_TO_REPHASE: u32 = 6;
+/// The tracked interval stays within announced / this of the announced one.
+const INTERVAL_BOUND_DIVISOR: i128 = 16;
+/// Announced intervals are clamped to this range (ns): 10 kHz to 1 Hz.
+const ANNOUNCED_RANGE: (i64, i64) = (100_000, 1_000_000_000);
+
+/// The grid of refreshes as far as it is known.
+#[derive(Clone, Debug)]
+pub(super) struct RefreshTracker {
+    /// Announced interval, fixed point.
+    announced: i128,
+    /// Tracked interval, fixed point, within its bounds around `announced`.
+    interval: i128,
+    /// A refresh, fixed point; the newest that feedback told of. None until anything is known.
+    anchor: Option<i128>,
+    /// Whether `anchor` comes from the display and not from our own first plan.
+    is_measured: bool,
+    outliers_in_a_row: u32,
+    outliers: u64,
+}
+
+impl RefreshTracker {
+    pub(super) fn new(announced: MonoSpan, known_refresh: Option<MonoTime>) -> Self {
+        let ns = announced.as_ns().clamp(ANNOUNCED_RANGE.0, ANNOUNCED_RANGE.1);
+        let announced = i128::from(ns) << FRACTION;
+        Self {
+            announced,
+            interval: announced,
+            anchor: known_refresh.map(fixed),
+            is_measured: known_refresh.is_some(),
+            outliers_in_a_row: 0,
+            outliers: 0,
+        }
+    }
+
+    /// Time between two refreshes, to the nearest nanosecond.
+    pub(super) fn interval(&self) -> MonoSpan {
+        MonoSpan::from_ns(saturate((self.interval + HALF) >> FRACTION))
+    }
+
+    /// Timestamps that were off the grid and not followed.
+    pub(super) fn outliers(&self) -> u64 {
+        self.outliers
+    }
+
+    /// Puts the grid on `time` if nothing better is known.
+    pub(super) fn anchor_at(&mut self, time: MonoTime) {
+        self.anchor.get_or_insert(fixed(time));
+    }
+
+    /// The first refresh at or after `time`, to the nearest nanosecond; `time` itself without grid.
+    pub(super) fn at_or_after(&self, time: MonoTime) -> MonoTime {
+        let Some(anchor) = self.anchor else { return time };
+        // Half a nanosecond early, so that a refresh that was rounded down is found again.
+        let after = fixed(time) - HALF - anchor;
+        let refreshes = (after + self.interval - 1).div_euclid(self.interval);
+        let ns = (anchor + refreshes * self.interval + HALF) >> FRACTION;
+        MonoTime::ZERO + MonoSpan::from_ns(saturate(ns.max(0)))
+    }
+
+    /// The display has shown a frame at `presented_at`.
+    pub(super) fn on_presented(&mut self, presented_at: MonoTime) {
+        let time = fixed(presented_at);
+        let (Some(anchor), true) = (self.anchor, self.is_measured) else {
+            self.anchor = Some(time);
+            self.is_measured = true;
+            return;
+        };
+        let refreshes = (time - anchor + self.interval / 2).div_euclid(self.interval);
+        if refreshes < 0 {
+            return; // out of order: newer feedback has said more
+        }
+        let predicted = anchor + refreshes * self.interval;
+        let residual = time - predicted;
+        if residual.abs() * 100 > self.interval * GATE_PERCENT {
+            self.outliers += 1;
+            self.outliers_in_a_row += 1;
+            if self.outliers_in_a_row >= OUTLIERS_TO_REPHASE {
+                self.anchor = Some(time);
+                self.outliers_in_a_row = 0;
+            }
+            return;
+        }
+        self.outliers_in_a_row = 0;
+        self.anchor = Some(predicted + residual / ALPHA_DIVISOR);
+        let bound = self.announced / INTERVAL_BOUND_DIVISOR;
+        self.interval = (self.interval + residual / (BETA_DIVISOR * refreshes.max(1)))
+            .clamp(self.announced - bound, self.announced + bound);
+    }
+
+    pub(super) fn verify_invariants(&self) {
+        let bound = self.announced / INTERVAL_BOUND_DIVISOR;
+        assert!(
+            (self.interval - self.announced).abs() <= bound,
+            "interval out of bounds: {self:?}"
+        );
+        assert!(self.outliers_in_a_row < OUTLIERS_TO_REPHASE, "rephasing was missed: {self:?}");
+        assert!(self.anchor.is_some() || !self.is_measured, "measured without a grid: {self:?}");
+    }
+}
+
+const HALF: i128 = 1 << (FRACTION - 1);
+
+fn fixed(time: MonoTime) -> i128 {
+    i128::from(time.as_ns()) << FRACTION
+}
+
+fn saturate(ns: i128) -> i64 {
+    i64::try_from(ns).unwrap_or(if ns < 0 { i64::MIN } else { i64::MAX })
+}
