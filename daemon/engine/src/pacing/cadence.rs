@@ -50,9 +50,9 @@ impl KeyCadence {
     /// How content time may run ahead of a key while present time is `delay` ahead of it.
     pub(super) fn easing(&self, delay: MonoSpan) -> Easing {
         let Some(interval) = self.interval() else { return Easing::HOLD };
-        let usual = match (self.gaps.percentile(50), self.gaps.percentile(90)) {
-            // The 90th percentile, and as much again as half its distance from the middle.
-            (Some(middle), Some(high)) => high + (high - middle).scale(1, 2) - delay,
+        let usual = match (self.gaps.percentile(50), self.gaps.percentile(75)) {
+            // Tukey's fence for outliers, of the upper half: a quarter of all keys may be late.
+            (Some(middle), Some(upper)) => upper + (upper - middle).scale(2, 1) - delay,
             _ => interval,
         };
         let longest = interval.scale(LONGEST_LEAD_HALVES, 2);
