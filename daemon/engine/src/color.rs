@@ -143,6 +143,13 @@ pub enum ColorPlane {
     Rgba16f(Plane<OrderedRgba16>),
 }
 
+impl Default for ColorPlane {
+    /// An empty plane.
+    fn default() -> Self {
+        Self::new(ColorFormat::Rgba8, 0, 0)
+    }
+}
+
 impl ColorPlane {
     /// A plane of zero bits (black, transparent).
     #[must_use]
@@ -151,6 +158,17 @@ impl ColorPlane {
             ColorFormat::Rgba8 => Self::Rgba8(Plane::new(width, height)),
             ColorFormat::Rgb10a2 => Self::Rgb10a2(Plane::new(width, height)),
             ColorFormat::Rgba16f => Self::Rgba16f(Plane::new(width, height)),
+        }
+    }
+
+    /// Changes format and size, keeping the allocation where the format stays. Write every pixel
+    /// before reading it.
+    pub fn reset(&mut self, format: ColorFormat, width: u32, height: u32) {
+        match (&mut *self, format) {
+            (Self::Rgba8(plane), ColorFormat::Rgba8) => plane.resize(width, height),
+            (Self::Rgb10a2(plane), ColorFormat::Rgb10a2) => plane.resize(width, height),
+            (Self::Rgba16f(plane), ColorFormat::Rgba16f) => plane.resize(width, height),
+            _ => *self = Self::new(format, width, height),
         }
     }
 
@@ -181,6 +199,16 @@ impl ColorPlane {
             Self::Rgba8(plane) => plane.height(),
             Self::Rgb10a2(plane) => plane.height(),
             Self::Rgba16f(plane) => plane.height(),
+        }
+    }
+
+    /// Takes on the pixels, size and format of `other`, keeping the allocation where it fits.
+    pub fn copy_from(&mut self, other: &Self) {
+        match (&mut *self, other) {
+            (Self::Rgba8(to), Self::Rgba8(from)) => to.copy_from(from),
+            (Self::Rgb10a2(to), Self::Rgb10a2(from)) => to.copy_from(from),
+            (Self::Rgba16f(to), Self::Rgba16f(from)) => to.copy_from(from),
+            (to, from) => *to = from.clone(),
         }
     }
 

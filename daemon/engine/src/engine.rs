@@ -1,16 +1,21 @@
 //! Runs the steps in order: a key frame in, in-between frames out.
 //!
-//! One [`Engine`] serves one stream. It keeps the two newest keys and reuses its buffers.
+//! One [`Engine`] serves one stream. It keeps the two newest keys and reuses its buffers: once
+//! every buffer has its size, neither a key nor a frame allocates pixels.
 
 use std::num::NonZeroUsize;
 
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
 use crate::color::ColorPlane;
-use crate::decode::{DecodeError, decode_key};
-use crate::format::StreamFormat;
+use crate::decode::{DecodeError, DecodeScratch, decode_key};
+use crate::field::FieldMap;
+use crate::format::{DepthMeaning, StreamFormat};
 use crate::key::{KeyFrame, KeyInput};
 use crate::method::Method;
 use crate::phase::Phase;
 use crate::time::{MonoSpan, MonoTime};
+use crate::warp;
 
 /// What an engine does and with how much of the machine.
 #[derive(Clone, Copy, Debug)]
@@ -33,6 +38,9 @@ pub struct KeyReport {
     pub work: MonoSpan,
     /// Whether in-between frames after this key can move.
     pub motion: MotionState,
+    /// What the projection says that depth means, where it contradicts what the stream declares.
+    /// The projection was followed.
+    pub depth_contradiction: Option<DepthMeaning>,
 }
 
 /// Why in-between frames after a key move, or do not.
@@ -44,6 +52,8 @@ pub enum MotionState {
     Missing,
     /// The key is a cut: its motion points into another scene.
     Cut,
+    /// Vectors lack the camera's motion, and the key has no depth or not both cameras.
+    LacksCamera,
 }
 
 /// What making one in-between frame led to.
@@ -62,15 +72,34 @@ pub struct FrameReport {
 pub struct Engine {
     format: StreamFormat,
     config: EngineConfig,
+    pool: ThreadPool,
     newest: Option<KeyFrame>,
     previous: Option<KeyFrame>,
+    /// A key frame that is no longer needed, whose buffers the next one takes over.
+    spare: KeyFrame,
+    scratch: Scratch,
+}
+
+/// Buffers of the steps, kept from frame to frame.
+#[derive(Debug, Default)]
+struct Scratch {
+    decode: DecodeScratch,
+    map: FieldMap,
 }
 
 impl Engine {
-    /// An engine for one stream.
+    /// An engine for one stream. It starts its threads now, fewer where the system gives fewer.
     #[must_use]
     pub fn new(format: StreamFormat, config: EngineConfig) -> Self {
-        Self { format, config, newest: None, previous: None }
+        Self {
+            format,
+            config,
+            pool: start_pool(config.threads.get()),
+            newest: None,
+            previous: None,
+            spare: KeyFrame::default(),
+            scratch: Scratch::default(),
+        }
     }
 
     /// What the stream declared.
@@ -93,19 +122,46 @@ impl Engine {
     /// Takes in a key frame. The one before it becomes the previous key, unless this is a cut.
     ///
     /// # Errors
-    /// If the planes contradict the stream's format or hold what cannot be converted. The keys
-    /// already taken in stay as they were.
+    /// If its content time is not later than the newest key's, or the planes contradict the
+    /// stream's format or hold what cannot be converted. The keys already taken in stay as they
+    /// were.
     pub fn push_key(&mut self, input: &KeyInput<'_>) -> Result<KeyReport, DecodeError> {
         let started_at = (self.config.timer)();
-        let key = decode_key(&self.format, input)?;
-        let motion = match (key.is_cut, key.motion_from) {
-            (true, _) => MotionState::Cut,
-            (false, Some(_)) => MotionState::Usable,
-            (false, None) => MotionState::Missing,
+        if let Some(newest) = self.newest.as_ref().map(|key| key.content_time)
+            && input.content_time <= newest
+        {
+            return Err(DecodeError::TimeBackwards { newest, found: input.content_time });
+        }
+        let noticed = decode_key(
+            &self.pool,
+            &self.format,
+            input,
+            self.config.pixels_per_degree,
+            &mut self.scratch.decode,
+            &mut self.spare,
+        )?;
+        let key = std::mem::take(&mut self.spare);
+        let motion = match key.motion_from {
+            _ if key.is_cut => MotionState::Cut,
+            Some(_) => MotionState::Usable,
+            None if noticed.lacks_camera_motion => MotionState::LacksCamera,
+            None => MotionState::Missing,
         };
-        self.previous = if key.is_cut { None } else { self.newest.take() };
-        self.newest = Some(key);
-        Ok(KeyReport { work: (self.config.timer)() - started_at, motion })
+        if !key.velocity.data().is_empty() {
+            let cells = [key.velocity.width(), key.velocity.height()];
+            self.scratch.map.update(key.valid, cells, key.field_offset);
+        }
+        let newest = self.newest.replace(key);
+        let dropped = std::mem::replace(&mut self.previous, newest);
+        self.spare = dropped.unwrap_or_default();
+        if input.is_cut {
+            self.spare = self.previous.take().unwrap_or_default();
+        }
+        Ok(KeyReport {
+            work: (self.config.timer)() - started_at,
+            motion,
+            depth_contradiction: noticed.depth_contradiction,
+        })
     }
 
     /// Makes the picture that shows `content_time` into `out`, which takes on the size and format
@@ -121,7 +177,44 @@ impl Engine {
             Some(span) => Phase::at(content_time, key.content_time, span),
             None => Phase::ZERO,
         };
-        out.clone_from(&key.color);
+        out.reset(key.color.format(), key.color.width(), key.color.height());
+        match self.config.method {
+            Method::Blend => self.blend(content_time, out),
+            _ if phase == Phase::ZERO => out.copy_from(&key.color),
+            Method::Gather => {
+                warp::gather::warp_gather(&self.pool, key, &self.scratch.map, phase, out);
+            }
+            Method::Hold | Method::Grid | Method::Linear => out.copy_from(&key.color),
+        }
         Some(FrameReport { key_index: key.index, phase, work: (self.config.timer)() - started_at })
     }
+
+    /// The mean of both keys strictly between them; the nearer of the two at them and outside.
+    fn blend(&self, content_time: MonoTime, out: &mut ColorPlane) {
+        match (&self.previous, &self.newest) {
+            (Some(older), Some(newer)) if content_time < newer.content_time => {
+                if content_time > older.content_time {
+                    warp::blend::blend(&self.pool, &older.color, &newer.color, out);
+                } else {
+                    out.copy_from(&older.color);
+                }
+            }
+            (_, Some(newest)) => out.copy_from(&newest.color),
+            (_, None) => {}
+        }
+    }
 }
+
+/// A pool of `threads`, or of as many as the system starts.
+fn start_pool(threads: usize) -> ThreadPool {
+    (1..=threads)
+        .rev()
+        .find_map(|threads| {
+            let name = |index| format!("foreframe-{index}");
+            ThreadPoolBuilder::new().num_threads(threads).thread_name(name).build().ok()
+        })
+        .expect("a system that runs this thread can start one more")
+}
+
+#[cfg(test)]
+mod tests;

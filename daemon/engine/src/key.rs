@@ -80,7 +80,10 @@ impl Velocity {
 }
 
 /// A key frame in the one convention of the engine.
-#[derive(Clone, Debug)]
+///
+/// `depth` and `velocity`, where present, have the same size: the field grid. Its cells share
+/// `valid` out evenly; [`crate::field::FieldMap`] is the one definition of where a cell lies.
+#[derive(Clone, Debug, Default)]
 pub struct KeyFrame {
     /// Sequence number that the application counts up.
     pub index: u64,
@@ -98,6 +101,9 @@ pub struct KeyFrame {
     pub depth: Plane<u32>,
     /// Dilated, quantised motion per cell of the field grid. Empty without a motion plane.
     pub velocity: Plane<Velocity>,
+    /// Jitter of the field against the colour, Q8 pixels of the colour plane: how far right and
+    /// down of its even place each cell lies. 0 without jitter.
+    pub field_offset: [i32; 2],
     /// Camera at `content_time`.
     pub camera: Option<Camera>,
 }

@@ -11,9 +11,11 @@
 //! Everything after the trajectory is integer arithmetic, so that one input gives one output on
 //! every machine and for any number of threads.
 
+pub mod bands;
 pub mod color;
 pub mod decode;
 pub mod engine;
+pub mod field;
 pub mod fill;
 pub mod format;
 pub mod key;

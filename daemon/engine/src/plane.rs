@@ -22,6 +22,12 @@ impl<T: Copy + Default> Plane<T> {
         self.height = height;
         self.data.resize(width as usize * height as usize, T::default());
     }
+
+    /// Takes on the pixels and size of `other`, keeping the allocation where it is large enough.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.resize(other.width, other.height);
+        self.data.copy_from_slice(&other.data);
+    }
 }
 
 impl<T> Plane<T> {

@@ -10,6 +10,7 @@ pub const NO_TRACKING_DEG_PER_S: f32 = 90.0;
 /// Cubic smooth-step with f(70) = 1, f(90) = 0 and zero slope at both (Didyk et al. 2010,
 /// section 6, after Daly 1998). NaN gives 0.
 #[must_use]
+#[expect(clippy::manual_clamp, reason = "clamp would let NaN through")]
 pub fn tracked_share(speed: f32) -> f32 {
     let range = NO_TRACKING_DEG_PER_S - FULL_TRACKING_DEG_PER_S;
     let t = ((NO_TRACKING_DEG_PER_S - speed) / range).max(0.0).min(1.0);

@@ -1,65 +1,152 @@
 //! The border of the engine: converts what a stream declared to the one convention inside.
 //!
-//! Owns every conversion of STREAM conventions (direction, unit, scale, jitter, depth meaning,
+//! Owns every conversion of stream conventions (direction, unit, scale, jitter, depth meaning,
 //! plane ratio, valid rectangle) and every check of plane geometry and of poisoned numbers.
+//! Inside there is one convention: colour at the size of the output, depth keys that grow towards
+//! the eye, motion as newer minus older position in output pixels, both on one field grid.
+//!
+//! The field grid takes, per axis, the resolution of the finer of the depth and motion planes.
+//! The other plane, and a jitter that differs, are resampled by nearest sample: a mean of two
+//! depths or of two motions belongs to no surface. A key is converted completely or not at all.
 
-use crate::color::{ColorPlane, Rgba8};
-use crate::format::{ColorFormat, StreamFormat};
+mod camera;
+mod color;
+mod depth;
+mod error;
+mod field;
+mod geometry;
+mod motion;
+
+pub use error::{DecodeError, PlaneName};
+
+use rayon::ThreadPool;
+
+use crate::color::ColorPlane;
+use crate::format::{CameraMotion, DepthMeaning, StreamFormat};
 use crate::key::{KeyFrame, KeyInput};
 use crate::plane::{Plane, Rect};
+use crate::trajectory::dilate_motion::{DilateParams, dilate_motion};
+use camera::ProjectionDepth;
+use field::FieldInput;
+use geometry::CheckedPlane;
 
-/// A key frame that contradicts its stream, or holds what cannot be converted.
-#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum DecodeError {
-    /// The colour plane does not have the stream's size.
-    #[error(
-        "colour plane: expected {expected_width}x{expected_height} pixels, found {width}x{height}"
-    )]
-    ColorSize {
-        /// Of the stream.
-        expected_width: u32,
-        /// Of the stream.
-        expected_height: u32,
-        /// Of the plane.
-        width: u32,
-        /// Of the plane.
-        height: u32,
-    },
+/// Buffers of the decode step, kept from key to key.
+#[derive(Clone, Debug, Default)]
+pub struct DecodeScratch {
+    color: ColorPlane,
+    displacement: Plane<[f32; 2]>,
+    columns: [Vec<u16>; 2],
 }
 
-/// Converts one key frame.
+/// What was noticed while a key was decoded.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct DecodeReport {
+    /// What the projection says that depth means, where it contradicts the stream.
+    pub depth_contradiction: Option<DepthMeaning>,
+    /// Vectors lack the camera's motion, and depth or one of the two cameras is missing.
+    pub lacks_camera_motion: bool,
+}
+
+/// Converts one key frame into `key`, whose buffers are reused. Motion that no eye can follow is
+/// damped where `pixels_per_degree` is given.
 ///
 /// # Errors
-/// If its planes contradict the stream's format.
-pub fn decode_key(format: &StreamFormat, input: &KeyInput<'_>) -> Result<KeyFrame, DecodeError> {
-    let (width, height) = (input.color.width, input.color.height);
-    if (width, height) != (format.width, format.height) {
-        return Err(DecodeError::ColorSize {
-            expected_width: format.width,
-            expected_height: format.height,
-            width,
-            height,
-        });
+/// If its planes contradict the stream's format. `key` then holds no key frame.
+pub fn decode_key(
+    pool: &ThreadPool,
+    format: &StreamFormat,
+    input: &KeyInput<'_>,
+    pixels_per_degree: Option<f32>,
+    scratch: &mut DecodeScratch,
+    key: &mut KeyFrame,
+) -> Result<DecodeReport, DecodeError> {
+    let planes = CheckedKey::new(format, input)?;
+    let mut report = DecodeReport::default();
+    key.index = input.index;
+    key.content_time = input.content_time;
+    key.is_cut = input.is_cut;
+    key.camera = input.camera;
+    key.valid =
+        color::decode_color(pool, format, &planes.color, &mut scratch.color, &mut key.color);
+    let projection =
+        input.camera.and_then(|camera| ProjectionDepth::from_projection(&camera.projection));
+    let field = FieldInput::new(format, input, &planes, projection, key.valid, pool)?;
+    key.field_offset = field.offset();
+    key.motion_from = None;
+    key.velocity.resize(0, 0);
+    key.depth.resize(0, 0);
+    if field.has_depth() {
+        report.depth_contradiction = field.decode_depth(&mut scratch.columns, &mut key.depth);
     }
-    let mut color = ColorPlane::new(ColorFormat::Rgba8, width, height);
-    if let ColorPlane::Rgba8(plane) = &mut color {
-        for y in 0..height {
-            let row = &input.color.bytes[y as usize * input.color.stride as usize..];
-            for (texel, bytes) in plane.row_mut(y).iter_mut().zip(row.chunks_exact(4)) {
-                *texel = Rgba8(u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]));
-            }
+    let Some(span) = planes.motion.and(input.motion_from).map(|from| input.content_time - from)
+    else {
+        return Ok(report);
+    };
+    if input.is_cut {
+        return Ok(report);
+    }
+    let lacks_camera =
+        format.motion.is_some_and(|motion| motion.camera_motion == CameraMotion::Missing);
+    if lacks_camera
+        && (planes.depth.is_none() || input.camera.is_none() || input.motion_from_camera.is_none())
+    {
+        report.lacks_camera_motion = true;
+        return Ok(report);
+    }
+    field.decode_motion(&mut scratch.columns, &mut scratch.displacement)?;
+    let params = DilateParams { pixels_per_degree, span };
+    dilate_motion(pool, &params, &key.depth, &scratch.displacement, &mut key.velocity);
+    key.motion_from = input.motion_from;
+    Ok(report)
+}
+
+/// The planes of a key, each checked on its own and against the stream.
+struct CheckedKey<'a> {
+    color: CheckedPlane<'a>,
+    depth: Option<CheckedPlane<'a>>,
+    motion: Option<CheckedPlane<'a>>,
+}
+
+impl<'a> CheckedKey<'a> {
+    fn new(format: &StreamFormat, input: &KeyInput<'a>) -> Result<Self, DecodeError> {
+        let (width, height, max) = (format.width, format.height, StreamFormat::MAX_SIZE);
+        if width == 0 || height == 0 || width > max || height > max {
+            return Err(DecodeError::StreamSize { max, width, height });
         }
+        if (input.color.width, input.color.height) != (width, height) {
+            return Err(DecodeError::ColorSize {
+                expected_width: width,
+                expected_height: height,
+                width: input.color.width,
+                height: input.color.height,
+            });
+        }
+        let color =
+            CheckedPlane::new(PlaneName::Color, &input.color, format.color.bytes_per_pixel())?;
+        let field_plane = |plane, found: Option<_>, bytes_per_pixel: Option<u32>| {
+            let Some(found) = found else { return Ok(None) };
+            let bytes_per_pixel = bytes_per_pixel.ok_or(DecodeError::Undeclared { plane })?;
+            let checked = CheckedPlane::new(plane, &found, bytes_per_pixel)?;
+            checked.check_ratio(plane, color.valid)?;
+            Ok(Some(checked))
+        };
+        let depth_bytes = format.depth.map(|depth| depth.format.bytes_per_pixel());
+        let motion_bytes = format.motion.map(|motion| motion.format.bytes_per_pixel());
+        let depth = field_plane(PlaneName::Depth, input.depth, depth_bytes)?;
+        let motion = field_plane(PlaneName::Motion, input.motion, motion_bytes)?;
+        for camera in [&input.camera, &input.motion_from_camera].into_iter().flatten() {
+            camera::check_camera(camera)?;
+        }
+        if let Some(motion_from) = input.motion_from.filter(|from| *from >= input.content_time) {
+            let content_time = input.content_time;
+            return Err(DecodeError::MotionFrom { content_time, motion_from });
+        }
+        Ok(Self { color, depth, motion })
     }
-    Ok(KeyFrame {
-        index: input.index,
-        content_time: input.content_time,
-        motion_from: None,
-        is_cut: input.is_cut,
-        color,
-        valid: Rect::full(width, height),
-        depth: Plane::default(),
-        velocity: Plane::default(),
-        camera: input.camera,
-    })
+}
+
+/// The part of the output that shows the image of a key with this valid rectangle.
+#[expect(clippy::cast_precision_loss, reason = "sizes up to 8192 are exact")]
+fn size(rect: Rect) -> [f32; 2] {
+    [rect.width as f32, rect.height as f32]
 }

@@ -1,5 +1,23 @@
 //! Moves colour along trajectories: gather (backward), scatter (forward) and the snapped grid.
 //!
 //! Positions are signed Q8 pixels of the colour plane: the centre of pixel `i` is `i * 256`.
+//! What lies outside a key's valid rectangle is shown as it is by every method.
 
+pub mod blend;
+pub mod gather;
 pub mod sample;
+
+use crate::key::Velocity;
+use crate::phase::Phase;
+
+/// Displacement after `phase` of a surface that moves by `velocity` per motion span, Q8 pixels:
+/// `(v p + 256) >> 9` with v in 1/32 pixel and p in Q12. Where no velocity is known, 0.
+///
+/// |v| <= 32767 and p <= 16384, so the product stays inside an i32.
+#[must_use]
+pub fn displacement(velocity: Velocity, phase: Phase) -> [i32; 2] {
+    if !velocity.is_trackable() {
+        return [0, 0];
+    }
+    [velocity.x, velocity.y].map(|v| (i32::from(v) * phase.q12() + 256) >> 9)
+}

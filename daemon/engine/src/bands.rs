@@ -1,0 +1,45 @@
+//! Shares rows among threads. Which thread makes a row never changes what is in it.
+
+use rayon::ThreadPool;
+use rayon::iter::{IndexedParallelIterator, ParallelIterator};
+use rayon::slice::ParallelSliceMut;
+
+use crate::plane::Plane;
+
+/// Rows that one piece of work has at least: waking a thread for fewer costs more than it saves.
+const MIN_ROWS: usize = 8;
+
+/// Calls `row(y, pixels)` for every row of `plane`.
+pub fn for_each_row<T: Send>(
+    pool: &ThreadPool,
+    plane: &mut Plane<T>,
+    row: impl Fn(u32, &mut [T]) + Sync,
+) {
+    let width = plane.width() as usize;
+    for_each_chunk(pool, plane.data_mut(), width, row);
+}
+
+/// Calls `chunk(i, part)` for every `i`-th run of `length` elements of `data`.
+#[expect(clippy::cast_possible_truncation, reason = "planes have at most 8192 rows")]
+pub fn for_each_chunk<T: Send>(
+    pool: &ThreadPool,
+    data: &mut [T],
+    length: usize,
+    chunk: impl Fn(u32, &mut [T]) + Sync,
+) {
+    if length == 0 {
+        return;
+    }
+    if pool.current_num_threads() == 1 || data.len() <= MIN_ROWS * length {
+        for (y, part) in data.chunks_mut(length).enumerate() {
+            chunk(y as u32, part);
+        }
+        return;
+    }
+    pool.install(|| {
+        data.par_chunks_mut(length)
+            .enumerate()
+            .with_min_len(MIN_ROWS)
+            .for_each(|(y, part)| chunk(y as u32, part));
+    });
+}

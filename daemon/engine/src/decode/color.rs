@@ -1,0 +1,102 @@
+//! Colour planes to canonical form: [`crate::color`] says what that is.
+//!
+//! Half floats are clamped on entry: NaN to 0, infinity to the largest finite half of its sign.
+
+use rayon::ThreadPool;
+
+use super::geometry::CheckedPlane;
+use crate::bands::for_each_row;
+use crate::color::{ColorPlane, OrderedRgba16, Rgb10a2, Rgba8, Texel, half_to_ordered};
+use crate::format::{StreamFormat, ValidRectUse};
+use crate::plane::{Plane, Rect};
+use crate::warp::sample::sample;
+
+/// Bits of the largest finite half.
+const HALF_MAX: u16 = 0x7bff;
+const HALF_EXPONENT: u16 = 0x7c00;
+const HALF_SIGN: u16 = 0x8000;
+
+/// Reads `plane` into `color` and returns the rectangle of it that moves. `whole` keeps the plane
+/// as it came while its valid rectangle is stretched.
+pub(super) fn decode_color(
+    pool: &ThreadPool,
+    format: &StreamFormat,
+    plane: &CheckedPlane<'_>,
+    whole: &mut ColorPlane,
+    color: &mut ColorPlane,
+) -> Rect {
+    let full = Rect::full(format.width, format.height);
+    let stretch = format.valid_rect_use == ValidRectUse::Stretch && plane.valid != full;
+    let target = if stretch { &mut *whole } else { &mut *color };
+    target.reset(format.color, format.width, format.height);
+    match target {
+        ColorPlane::Rgba8(target) => {
+            read(pool, plane, target, |bytes: [u8; 4]| Rgba8(u32::from_le_bytes(bytes)));
+        }
+        ColorPlane::Rgb10a2(target) => {
+            read(pool, plane, target, |bytes: [u8; 4]| Rgb10a2(u32::from_le_bytes(bytes)));
+        }
+        ColorPlane::Rgba16f(target) => read(pool, plane, target, ordered_from_bytes),
+    }
+    if !stretch {
+        return plane.valid;
+    }
+    color.reset(format.color, format.width, format.height);
+    match (&*whole, color) {
+        (ColorPlane::Rgba8(from), ColorPlane::Rgba8(to)) => stretch_to(pool, from, plane.valid, to),
+        (ColorPlane::Rgb10a2(from), ColorPlane::Rgb10a2(to)) => {
+            stretch_to(pool, from, plane.valid, to);
+        }
+        (ColorPlane::Rgba16f(from), ColorPlane::Rgba16f(to)) => {
+            stretch_to(pool, from, plane.valid, to);
+        }
+        _ => unreachable!("both were reset to the stream's format"),
+    }
+    full
+}
+
+fn read<T: Texel, const N: usize>(
+    pool: &ThreadPool,
+    plane: &CheckedPlane<'_>,
+    target: &mut Plane<T>,
+    texel: impl Fn([u8; N]) -> T + Sync,
+) {
+    for_each_row(pool, target, |y, row| {
+        let (pixels, _) = plane.row(y).as_chunks::<N>();
+        for (to, from) in row.iter_mut().zip(pixels) {
+            *to = texel(*from);
+        }
+    });
+}
+
+fn ordered_from_bytes(bytes: [u8; 8]) -> OrderedRgba16 {
+    let (channels, _) = bytes.as_chunks::<2>();
+    OrderedRgba16(std::array::from_fn(|channel| {
+        half_to_ordered(finite_half(u16::from_le_bytes(channels[channel])))
+    }))
+}
+
+/// The bits of a half float with NaN replaced by 0 and infinity by the largest finite one.
+pub(super) fn finite_half(bits: u16) -> u16 {
+    match bits & !HALF_SIGN {
+        magnitude if magnitude < HALF_EXPONENT => bits,
+        HALF_EXPONENT => (bits & HALF_SIGN) | HALF_MAX,
+        _ => 0,
+    }
+}
+
+/// Resamples `valid` of `from` to the whole of `to`, bilinear, pixel edges on pixel edges:
+/// the centre of target pixel `i` lies at `(2 i + 1) * 256 * length / (2 * target) - 128` in Q8.
+fn stretch_to<T: Texel>(pool: &ThreadPool, from: &Plane<T>, valid: Rect, to: &mut Plane<T>) {
+    let (width, height) = (to.width(), to.height());
+    let position = |index: u32, target: u32, start: u32, length: u32| {
+        let within = u64::from(2 * index + 1) * 256 * u64::from(length) / (2 * u64::from(target));
+        i32::try_from(u64::from(start) * 256 + within).expect("8192 pixels in Q8 fit 21 bits") - 128
+    };
+    for_each_row(pool, to, |y, row| {
+        let from_y = position(y, height, valid.y, valid.height);
+        for (x, texel) in (0..).zip(row) {
+            *texel = sample(from, valid, position(x, width, valid.x, valid.width), from_y);
+        }
+    });
+}

@@ -1,0 +1,93 @@
+//! Depth planes to depth keys: `u32`, larger is nearer, proportional to 1 / distance.
+//!
+//! A key is the near distance over the distance, as a fraction of 2^32 - 1. Then one part in 256
+//! of a key is one part in 256 of the distance at any distance, which is what the tolerance of the
+//! scatter means. With a perspective camera the near distance is the projection's; without one a
+//! depth buffer is taken as that of a far plane at infinity, and a linear depth as if the near
+//! plane were [`LINEAR_NEAR`] away. Nearer than the near plane saturates. NaN counts as far.
+//!
+//! Computed in f64: `1 - d` of a far point keeps too few bits in f32.
+
+use super::camera::ProjectionDepth;
+use crate::format::{DepthConvention, DepthFormat, DepthMeaning};
+
+/// Near distance that linear depth is measured by where no camera tells one, world units. A key
+/// of a point 2^20 units away still has 12 bits.
+const LINEAR_NEAR: f64 = 1.0 / 16.0;
+
+/// Turns stored depth into keys.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) enum DepthToKey {
+    /// key = scale * stored + offset, as a fraction.
+    Buffer { scale: f64, offset: f64 },
+    /// key = near / stored, as a fraction.
+    Linear { near: f64 },
+}
+
+impl DepthToKey {
+    /// The conversion for what a stream declared and, if there is one, the projection says; and
+    /// the meaning that the projection contradicts the declaration with.
+    pub(super) fn new(
+        declared: DepthMeaning,
+        projection: Option<ProjectionDepth>,
+    ) -> (Self, Option<DepthMeaning>) {
+        match (declared, projection) {
+            (DepthMeaning::LinearView, None) => (Self::Linear { near: LINEAR_NEAR }, None),
+            // Half the near distance: a projection with clip z from -w to w, which linear depth
+            // does not depend on, reads as one whose near plane is twice as far.
+            (DepthMeaning::LinearView, Some(projection)) => {
+                (Self::Linear { near: 0.5 / projection.inverse_near() }, None)
+            }
+            (DepthMeaning::Standard, None) => (Self::Buffer { scale: -1.0, offset: 1.0 }, None),
+            (DepthMeaning::Reversed, None) => (Self::Buffer { scale: 1.0, offset: 0.0 }, None),
+            (_, Some(projection)) => {
+                let scale = 1.0 / (projection.b * projection.inverse_near());
+                let conversion = Self::Buffer { scale, offset: -projection.a * scale };
+                let contradicts = projection.meaning != declared;
+                (conversion, contradicts.then_some(projection.meaning))
+            }
+        }
+    }
+
+    /// The key of a stored value.
+    #[expect(clippy::cast_possible_truncation, reason = "float to int casts saturate, NaN is 0")]
+    #[expect(clippy::cast_sign_loss, reason = "float to int casts saturate")]
+    pub(super) fn key(self, stored: f64) -> u32 {
+        let fraction = match self {
+            Self::Buffer { scale, offset } => scale * stored + offset,
+            // A distance of 0 or behind the eye is as near as can be.
+            Self::Linear { near } => near / stored.max(0.0) + stored * 0.0,
+        };
+        (fraction * f64::from(u32::MAX)) as u32
+    }
+}
+
+/// Reads one stored value; integers are normalised to 0..1.
+pub(super) fn stored_depth(format: DepthFormat, row: &[u8], x: usize) -> f64 {
+    match format {
+        DepthFormat::F32 => f64::from(f32::from_le_bytes(bytes(row, x))),
+        DepthFormat::F16 => half::f16::from_le_bytes(bytes(row, x)).to_f64(),
+        DepthFormat::U16 => f64::from(u16::from_le_bytes(bytes(row, x))) / 65535.0,
+        DepthFormat::U24 => {
+            f64::from(u32::from_le_bytes(bytes(row, x)) & 0x00ff_ffff) / 16_777_215.0
+        }
+    }
+}
+
+/// Clip z / w of a stored value, for [`super::camera::CameraMotion::displacement`].
+#[expect(clippy::cast_possible_truncation, reason = "0 to 1 needs no more than an f32")]
+pub(super) fn clip_depth(
+    convention: DepthConvention,
+    projection: Option<ProjectionDepth>,
+    stored: f64,
+) -> f32 {
+    let depth = match (convention.meaning, projection) {
+        (DepthMeaning::LinearView, Some(projection)) => projection.a + projection.b / stored,
+        _ => stored,
+    };
+    depth as f32
+}
+
+fn bytes<const N: usize>(row: &[u8], x: usize) -> [u8; N] {
+    row.as_chunks::<N>().0[x]
+}

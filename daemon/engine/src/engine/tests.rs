@@ -1,0 +1,105 @@
+//! The engine as its users see it: keys in, frames out.
+
+use super::*;
+use crate::format::{CameraMotion, MotionConvention, MotionDirection, MotionFormat, MotionUnit};
+use crate::key::PlaneInput;
+use crate::plane::Rect;
+
+const SIZE: u32 = 16;
+
+fn format() -> StreamFormat {
+    StreamFormat {
+        motion: Some(MotionConvention {
+            format: MotionFormat::Rg32f,
+            direction: MotionDirection::PreviousToCurrent,
+            unit: MotionUnit::Pixels,
+            scale: [1.0, 1.0],
+            camera_motion: CameraMotion::Included,
+        }),
+        ..StreamFormat::rgba8(SIZE, SIZE)
+    }
+}
+
+fn engine(method: Method) -> Engine {
+    let threads = NonZeroUsize::MIN;
+    let config =
+        EngineConfig { method, threads, pixels_per_degree: None, timer: || MonoTime::ZERO };
+    Engine::new(format(), config)
+}
+
+/// Pushes a key whose pixel (x, y) is `seed + 16 * y + x` in each channel, moving 3 pixels right
+/// per 25 ms.
+fn push(engine: &mut Engine, at_ms: i64, seed: u8) -> Result<KeyReport, DecodeError> {
+    let color: Vec<u8> = (0..=255_u8).flat_map(|pixel| [pixel.wrapping_add(seed); 4]).collect();
+    let motion: Vec<u8> =
+        (0..256).flat_map(|_| [3.0_f32, 0.0]).flat_map(f32::to_le_bytes).collect();
+    let plane = |bytes, bytes_per_pixel: u32| PlaneInput {
+        bytes,
+        width: SIZE,
+        height: SIZE,
+        stride: SIZE * bytes_per_pixel,
+        valid: Rect::full(SIZE, SIZE),
+        jitter: [0.0; 2],
+    };
+    let content_time = MonoTime::ZERO + MonoSpan::from_ms(at_ms);
+    engine.push_key(&KeyInput {
+        index: 0,
+        content_time,
+        motion_from: Some(content_time - MonoSpan::from_ms(25)),
+        is_cut: false,
+        color: plane(&color, 4),
+        depth: None,
+        motion: Some(plane(&motion, 8)),
+        camera: None,
+        motion_from_camera: None,
+    })
+}
+
+fn frame(engine: &mut Engine, at_ms: i64) -> Vec<u8> {
+    let mut out = ColorPlane::default();
+    engine.synthesise(MonoTime::ZERO + MonoSpan::from_ms(at_ms), &mut out).unwrap();
+    let mut bytes = Vec::new();
+    out.write_bytes(&mut bytes);
+    bytes.into_iter().step_by(4).collect()
+}
+
+#[test]
+fn gather_moves_the_picture_by_its_motion_times_the_phase() {
+    let mut engine = engine(Method::Gather);
+    push(&mut engine, 100, 0).unwrap();
+    let key = frame(&mut engine, 100);
+    let later = frame(&mut engine, 125);
+    for y in 0..16 {
+        assert_eq!(later[y * 16 + 3..][..13], key[y * 16..][..13], "row {y}");
+    }
+}
+
+#[test]
+fn blend_is_the_mean_strictly_between_the_keys_and_a_key_elsewhere() {
+    let mut engine = engine(Method::Blend);
+    push(&mut engine, 100, 0).unwrap();
+    let older = frame(&mut engine, 100);
+    push(&mut engine, 125, 10).unwrap();
+    let newer = frame(&mut engine, 125);
+    assert_ne!(older, newer);
+    assert_eq!(frame(&mut engine, 90), older);
+    assert_eq!(frame(&mut engine, 100), older);
+    assert_eq!(frame(&mut engine, 130), newer);
+    for at_ms in [101, 124] {
+        for ((mean, a), b) in frame(&mut engine, at_ms).into_iter().zip(&older).zip(&newer) {
+            assert_eq!(u32::from(mean), (u32::from(*a) + u32::from(*b)).div_ceil(2));
+        }
+    }
+}
+
+#[test]
+fn content_time_that_does_not_advance_is_refused_and_the_keys_stay() {
+    let mut engine = engine(Method::Hold);
+    push(&mut engine, 100, 0).unwrap();
+    let before = frame(&mut engine, 100);
+    let refused = push(&mut engine, 100, 7).unwrap_err();
+    assert!(matches!(refused, DecodeError::TimeBackwards { .. }), "{refused}");
+    assert_eq!(frame(&mut engine, 100), before);
+    push(&mut engine, 101, 7).unwrap();
+    assert_ne!(frame(&mut engine, 100), before);
+}
