@@ -1,15 +1,288 @@
-//! `foreframe pacing`.
+//! `foreframe pacing`: the pacer between a simulated application and a simulated display.
+//!
+//! Reads what to simulate, runs it twice on the same chance (our pacer, and a plain timer to
+//! compare with), and reports.
+
+use anyhow::ensure;
+use foreframe_engine::MonoSpan;
+use foreframe_engine::pacing::sim::{
+    DisplayScript, KeyScript, Policy, Scenario, SimReport, WorkScript, simulate,
+};
+use foreframe_engine::pacing::{PacerConfig, WorkEstimate};
+use serde::Serialize;
 
 use crate::output::Output;
 
+/// Jitter of synthesis times around `--work-ms`, +-: what a loaded two-core machine shows.
+const WORK_JITTER_PERCENT: i64 = 15;
+/// Error of simulated presentation timestamps, +-.
+const TIMESTAMP_JITTER: MonoSpan = MonoSpan::from_us(50);
+
 /// Arguments of `foreframe pacing`.
 #[derive(clap::Args, Debug)]
-pub struct Args {}
+pub struct Args {
+    /// Refresh rate of the display.
+    #[arg(long, value_name = "HZ", default_value_t = 120.0)]
+    refresh: f64,
+    /// Key frames per second.
+    #[arg(long, value_name = "HZ", default_value_t = 40.0)]
+    key_rate: f64,
+    /// Arrivals of keys are off by up to this, plus or minus.
+    #[arg(long, value_name = "MS", default_value_t = 2.0)]
+    jitter_ms: f64,
+    /// The same as a share of the key interval; added to `--jitter-ms`.
+    #[arg(long, value_name = "P", default_value_t = 0.0)]
+    arrival_jitter_percent: f64,
+    /// Content times of keys are off by up to this share of the key interval, plus or minus.
+    #[arg(long, value_name = "P", default_value_t = 0.0)]
+    content_jitter_percent: f64,
+    /// Keys that arrive a whole key interval late, in percent.
+    #[arg(long, value_name = "P", default_value_t = 0.0)]
+    late_percent: f64,
+    /// How long to simulate.
+    #[arg(long, value_name = "S", default_value_t = 60.0)]
+    seconds: f64,
+    /// By how much the display's period is longer than it says, in millionths.
+    #[arg(long, value_name = "PPM", default_value_t = 50, allow_negative_numbers = true)]
+    drift_ppm: i32,
+    /// Refreshes that the display skips, in percent.
+    #[arg(long, value_name = "P", default_value_t = 0.0)]
+    skipped_percent: f64,
+    /// Time that making a picture takes, usually.
+    #[arg(long, value_name = "MS", default_value_t = 2.0)]
+    work_ms: f64,
+    /// Where chance comes from.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+}
+
+/// The report. Scripts read these names, so they stay as they are.
+#[derive(Serialize, Debug)]
+struct Report {
+    #[serde(flatten)]
+    pacer: Row,
+    naive_timer: Row,
+    refresh_error_ppm: f64,
+    clock_steps: u64,
+    relocks: u64,
+}
+
+/// What one pacer came to.
+#[derive(Serialize, Debug)]
+struct Row {
+    keys: u64,
+    keys_shown: u64,
+    presents: u64,
+    real: u64,
+    synthesised: u64,
+    repeated: u64,
+    missed: u64,
+    dropped: u64,
+    on_target_percent: f64,
+    interval_5_95_ms: f64,
+    content_judder: f64,
+    content_judder_after_1_s: f64,
+    backward_steps: u64,
+    latency_ms: Percentiles,
+    content_age_p50_ms: f64,
+}
+
+#[derive(Serialize, Debug)]
+struct Percentiles {
+    p50: f64,
+    p99: f64,
+}
 
 /// Runs the command.
 ///
 /// # Errors
-/// Always, until it exists.
-pub fn run(_args: &Args, _output: &Output) -> anyhow::Result<()> {
-    anyhow::bail!("pacing does not exist yet")
+/// If an argument is out of range, or standard output cannot be written.
+pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
+    let scenario = scenario(args)?;
+    let config = PacerConfig {
+        refresh_interval: scenario.display.refresh_interval,
+        known_refresh: None,
+        interpolates: false,
+        work: WorkEstimate::Measured,
+    };
+    let ours = simulate(&scenario, Policy::Pacer(config));
+    let naive = simulate(&scenario, Policy::NaiveTimer);
+    let truth = scenario.display.refresh_interval.as_secs_f64()
+        * (1.0 + f64::from(scenario.display.drift_ppm) * 1e-6);
+    let tracked = ours.status.map_or(truth, |status| status.refresh_interval.as_secs_f64());
+    let counts = ours.status.map(|status| status.counts).unwrap_or_default();
+    let report = Report {
+        pacer: Row::from(&ours),
+        naive_timer: Row::from(&naive),
+        refresh_error_ppm: round((tracked / truth - 1.0) * 1e6, 1),
+        clock_steps: counts.clock_steps,
+        relocks: counts.relocks,
+    };
+    output.result(&report, &text(args, &report))
+}
+
+fn scenario(args: &Args) -> anyhow::Result<Scenario> {
+    let refresh_interval = interval("--refresh", args.refresh)?;
+    let key_interval = interval("--key-rate", args.key_rate)?;
+    let seconds = within("--seconds", args.seconds, 0.1, 86_400.0)?;
+    let jitter = MonoSpan::from_secs_f64(within("--jitter-ms", args.jitter_ms, 0.0, 1e3)? / 1e3);
+    let arrival = per_mille("--arrival-jitter-percent", args.arrival_jitter_percent)?;
+    let content = per_mille("--content-jitter-percent", args.content_jitter_percent)?;
+    let work = MonoSpan::from_secs_f64(within("--work-ms", args.work_ms, 0.0, 1e3)? / 1e3);
+    Ok(Scenario {
+        duration: MonoSpan::from_secs_f64(seconds),
+        seed: args.seed,
+        keys: KeyScript {
+            content_jitter: key_interval.scale(content.into(), 1_000),
+            arrival_jitter: jitter + key_interval.scale(arrival.into(), 1_000),
+            late_per_mille: per_mille("--late-percent", args.late_percent)?,
+            ..KeyScript::steady(key_interval)
+        },
+        display: DisplayScript {
+            drift_ppm: args.drift_ppm.clamp(-1_000, 1_000),
+            skipped_per_mille: per_mille("--skipped-percent", args.skipped_percent)?.min(900),
+            timestamp_jitter: TIMESTAMP_JITTER,
+            ..DisplayScript::steady(refresh_interval)
+        },
+        work: WorkScript {
+            typical: work,
+            jitter: work.scale(WORK_JITTER_PERCENT, 100),
+            spike_per_mille: 0,
+        },
+    })
+}
+
+fn interval(option: &str, hz: f64) -> anyhow::Result<MonoSpan> {
+    Ok(MonoSpan::from_hz(within(option, hz, 1.0, 1_000.0)?))
+}
+
+/// Percent as parts per thousand.
+#[expect(clippy::cast_possible_truncation, reason = "between 0 and 1000")]
+#[expect(clippy::cast_sign_loss, reason = "between 0 and 1000")]
+fn per_mille(option: &str, percent: f64) -> anyhow::Result<u32> {
+    Ok((within(option, percent, 0.0, 100.0)? * 10.0).round() as u32)
+}
+
+fn within(option: &str, value: f64, low: f64, high: f64) -> anyhow::Result<f64> {
+    ensure!((low..=high).contains(&value), "{option}: expected {low} to {high}, found {value}");
+    Ok(value)
+}
+
+impl From<&SimReport> for Row {
+    fn from(report: &SimReport) -> Self {
+        let ms = |span: MonoSpan| round(span.as_ms_f64(), 3);
+        Self {
+            keys: report.keys,
+            keys_shown: report.keys_shown,
+            presents: report.presents,
+            real: report.real,
+            synthesised: report.synthesised,
+            repeated: report.repeated,
+            missed: report.missed,
+            dropped: report.dropped,
+            on_target_percent: round(report.on_target * 100.0, 3),
+            interval_5_95_ms: ms(report.interval_5_95),
+            content_judder: round(report.content_judder, 5),
+            content_judder_after_1_s: round(report.steady_judder, 5),
+            backward_steps: report.backward_steps,
+            latency_ms: Percentiles { p50: ms(report.latency_p50), p99: ms(report.latency_p99) },
+            content_age_p50_ms: ms(report.content_age_p50),
+        }
+    }
+}
+
+fn text(args: &Args, report: &Report) -> String {
+    let rows = [("pacer", &report.pacer), ("naive timer", &report.naive_timer)];
+    let mut text = format!(
+        "{} s of {} Hz keys on a {} Hz display, simulated\n\n\
+         {:12} {:>8} {:>6} {:>8} {:>9} {:>7} {:>10} {:>10} {:>8} {:>8} {:>8}\n",
+        args.seconds,
+        args.key_rate,
+        args.refresh,
+        "",
+        "presents",
+        "real",
+        "repeated",
+        "missed",
+        "dropped",
+        "on target",
+        "5-95 % ms",
+        "judder",
+        "p50 ms",
+        "p99 ms",
+    );
+    for (name, row) in rows {
+        text += &format!(
+            "{:12} {:>8} {:>6} {:>8} {:>9} {:>7} {:>8.2} % {:>10.3} {:>8.4} {:>8.2} {:>8.2}\n",
+            name,
+            row.presents,
+            row.real,
+            row.repeated,
+            row.missed,
+            row.dropped,
+            row.on_target_percent,
+            row.interval_5_95_ms,
+            row.content_judder,
+            row.latency_ms.p50,
+            row.latency_ms.p99,
+        );
+    }
+    text + "\njudder: standard deviation of the content-time step over the refresh interval\n\
+            p50, p99: from the arrival of a key to the first refresh that shows it"
+}
+
+fn round(value: f64, digits: i32) -> f64 {
+    let scale = 10_f64.powi(digits);
+    (value * scale).round() / scale
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser as _;
+
+    use super::*;
+
+    #[derive(clap::Parser)]
+    struct Line {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    fn args(line: &str) -> Args {
+        Line::parse_from(std::iter::once("pacing").chain(line.split_whitespace())).args
+    }
+
+    #[test]
+    fn options_become_the_scenario() {
+        let scenario = scenario(&args(
+            "--refresh 100 --key-rate 50 --jitter-ms 1 --arrival-jitter-percent 10 \
+             --content-jitter-percent 30 --late-percent 2.5 --seconds 3 --drift-ppm -20",
+        ))
+        .unwrap();
+        assert_eq!(scenario.display.refresh_interval, MonoSpan::from_ms(10));
+        assert_eq!(scenario.keys.arrival_jitter, MonoSpan::from_ms(3));
+        assert_eq!(scenario.keys.content_jitter, MonoSpan::from_ms(6));
+        assert_eq!((scenario.keys.late_per_mille, scenario.display.drift_ppm), (25, -20));
+        assert_eq!(scenario.duration, MonoSpan::from_ms(3_000));
+    }
+
+    #[test]
+    fn what_is_out_of_range_names_the_option_and_both_numbers() {
+        for line in ["--refresh 0", "--key-rate nan", "--seconds -1", "--late-percent 101"] {
+            let error = scenario(&args(&line.replace(' ', "="))).unwrap_err().to_string();
+            let option = line.split(' ').next().unwrap();
+            assert!(error.starts_with(&format!("{option}: expected ")), "{error}");
+        }
+    }
+
+    #[test]
+    fn json_has_the_fixed_names() {
+        let scenario = scenario(&args("--seconds 1")).unwrap();
+        let row = Row::from(&simulate(&scenario, Policy::NaiveTimer));
+        let json = serde_json::to_value(&row).unwrap();
+        for name in ["presents", "missed", "on_target_percent", "interval_5_95_ms"] {
+            assert!(json[name].is_number(), "{name} in {json}");
+        }
+        assert!(json["content_judder"].is_number() && json["latency_ms"]["p99"].is_number());
+    }
 }

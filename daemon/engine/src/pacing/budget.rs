@@ -10,8 +10,11 @@ use crate::time::MonoSpan;
 const WORK_WINDOW: usize = 64;
 /// A twentieth of the frames may take longer than planned and live off the margin.
 const WORK_PERCENTILE: usize = 95;
-/// Margin that is never given up, for the hand-over itself.
-const MARGIN_FLOOR: MonoSpan = MonoSpan::from_us(250);
+/// What the hand-over itself takes: a message to a compositor, and its latch.
+const HAND_OVER: MonoSpan = MonoSpan::from_us(250);
+/// Margin that is never given up: the hand-over, and as much again for the work that takes longer
+/// than estimated. With less, the margin shrinks into a miss every second or so, again and again.
+const MARGIN_FLOOR: MonoSpan = MonoSpan::from_us(500);
 /// A miss widens the margin by at least this.
 const MARGIN_STEP: MonoSpan = MonoSpan::from_us(500);
 /// Each good frame shrinks the margin by 1/50 = 2 % of what is above the floor.
@@ -31,31 +34,38 @@ pub enum WorkEstimate {
 pub(super) struct Budget {
     estimate: WorkEstimate,
     work: Recent<WORK_WINDOW>,
+    /// The percentile of `work`. None before anything was measured.
+    measured: Option<MonoSpan>,
     margin: MonoSpan,
 }
 
 impl Budget {
     pub(super) fn new(estimate: WorkEstimate) -> Self {
-        Self { estimate, work: Recent::default(), margin: MARGIN_FLOOR }
+        Self { estimate, work: Recent::default(), measured: None, margin: MARGIN_FLOOR }
     }
 
-    /// Time from wake to hand-over. A quarter of a refresh before anything was measured.
+    /// Expected time from wake to the picture being ready. A quarter of a refresh before anything was measured.
     pub(super) fn work(&self, refresh_interval: MonoSpan) -> MonoSpan {
         match self.estimate {
             WorkEstimate::Constant(work) => work.max(MonoSpan::ZERO),
-            WorkEstimate::Measured => {
-                self.work.percentile(WORK_PERCENTILE).unwrap_or(refresh_interval.scale(1, 4))
-            }
+            WorkEstimate::Measured => self.measured.unwrap_or(refresh_interval.scale(1, 4)),
         }
     }
 
-    /// Time from hand-over to refresh, at most half a refresh.
+    /// Time that the hand-over itself takes.
+    pub(super) fn hand_over(&self, refresh_interval: MonoSpan) -> MonoSpan {
+        HAND_OVER.min(refresh_interval.scale(1, 2))
+    }
+
+    /// Time from the expected end of the work to the refresh: the hand-over, and what misses have
+    /// added to it. At most half a refresh.
     pub(super) fn margin(&self, refresh_interval: MonoSpan) -> MonoSpan {
         self.margin.min(refresh_interval.scale(1, 2))
     }
 
     pub(super) fn on_work(&mut self, work: MonoSpan) {
         self.work.push(work.max(MonoSpan::ZERO));
+        self.measured = self.work.percentile(WORK_PERCENTILE);
     }
 
     pub(super) fn on_good(&mut self) {

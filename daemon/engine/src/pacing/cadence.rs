@@ -14,6 +14,8 @@ use crate::time::{MonoSpan, MonoTime};
 const INTERVAL_WINDOW: usize = 32;
 /// Keys that the learned jitter looks back on.
 const GAP_WINDOW: usize = 64;
+/// Key interval before the second key: that of the slowest application that is well served.
+const FIRST_INTERVAL: MonoSpan = MonoSpan::from_ms(25);
 /// Velocity stays full for at most this many key intervals, in halves, however wild the jitter;
 /// with the rest of the easing that keeps the phase below 4.
 const LONGEST_LEAD_HALVES: i64 = 5;
@@ -24,6 +26,10 @@ pub(super) struct KeyCadence {
     previous: Option<MonoTime>,
     intervals: Recent<INTERVAL_WINDOW>,
     gaps: Recent<GAP_WINDOW>,
+    /// Median of `intervals`. None before the second key.
+    interval: Option<MonoSpan>,
+    /// The longest gap that is no outlier. None without gaps.
+    usual_gap: Option<MonoSpan>,
 }
 
 impl KeyCadence {
@@ -32,6 +38,8 @@ impl KeyCadence {
         if let Some(previous) = self.previous.filter(|&previous| previous < content_time) {
             self.intervals.push(content_time - previous);
             self.gaps.push(first_refresh - previous);
+            self.interval = self.intervals.percentile(50);
+            self.usual_gap = self.upper_fence();
         }
         self.previous = Some(content_time);
     }
@@ -40,23 +48,26 @@ impl KeyCadence {
     pub(super) fn on_clock_step(&mut self, content_time: MonoTime) {
         self.previous = Some(content_time);
         self.gaps.clear();
+        self.usual_gap = None;
     }
 
     /// Usual content time from one key to the next. None before the second key.
     pub(super) fn interval(&self) -> Option<MonoSpan> {
-        self.intervals.percentile(50)
+        self.interval
     }
 
     /// How content time may run ahead of a key while present time is `delay` ahead of it.
     pub(super) fn easing(&self, delay: MonoSpan) -> Easing {
-        let Some(interval) = self.interval() else { return Easing::HOLD };
-        let usual = match (self.gaps.percentile(50), self.gaps.percentile(75)) {
-            // Tukey's fence for outliers, of the upper half: a quarter of all keys may be late.
-            (Some(middle), Some(upper)) => upper + (upper - middle).scale(2, 1) - delay,
-            _ => interval,
-        };
+        let interval = self.interval().unwrap_or(FIRST_INTERVAL);
+        let usual = self.usual_gap.map_or(interval, |gap| gap - delay);
         let longest = interval.scale(LONGEST_LEAD_HALVES, 2);
         Easing::after(usual.clamp(interval, longest), interval)
+    }
+
+    /// Tukey's fence for outliers, of the upper half alone: a quarter of all keys may be late.
+    fn upper_fence(&self) -> Option<MonoSpan> {
+        let (middle, upper) = (self.gaps.percentile(50)?, self.gaps.percentile(75)?);
+        Some(upper + (upper - middle).scale(2, 1))
     }
 }
 
@@ -69,10 +80,11 @@ mod tests {
     }
 
     #[test]
-    fn one_key_alone_is_held() {
+    fn one_key_alone_moves_on_for_the_usual_interval_of_a_slow_application() {
         let mut cadence = KeyCadence::default();
         cadence.on_key(ms(100), ms(108));
-        assert_eq!(cadence.easing(MonoSpan::from_ms(8)), Easing::HOLD);
+        assert_eq!(cadence.interval(), None);
+        assert_eq!(cadence.easing(MonoSpan::from_ms(8)).full_until, FIRST_INTERVAL);
     }
 
     #[test]

@@ -15,8 +15,11 @@ use crate::time::{MonoSpan, MonoTime};
 /// Keys that the delay looks back on: 3 s at 40 Hz. Shorter and the minimum wanders with jitter,
 /// longer and extrapolation stays needlessly long after an early key.
 const WINDOW: usize = 128;
-/// The delay closes a gap to its target within this time constant.
-const SLEW_TIME: MonoSpan = MonoSpan::from_ms(500);
+/// Time constant with which the delay follows a smaller offer.
+const TIGHTEN_TIME: MonoSpan = MonoSpan::from_ms(500);
+/// Time constant with which it is released when small offers have left the window. Slow: the next
+/// one makes content time jump by what was released.
+const RELEASE_TIME: MonoSpan = MonoSpan::from_ms(4_000);
 /// It changes by at most 1/32 of the time that passes: velocity on the screen stays within 3 %.
 const FASTEST_SLEW_DIVISOR: i64 = 32;
 /// Content time that leaps ahead by more was set, not jittered.
@@ -42,6 +45,8 @@ pub(super) enum KeyTiming {
 pub(super) struct ContentClock {
     newest: Option<MonoTime>,
     offers: Recent<WINDOW>,
+    /// The smallest of `offers`.
+    target: Option<MonoSpan>,
     line: Option<Line>,
     lagging: u32,
 }
@@ -75,8 +80,9 @@ impl ContentClock {
             return KeyTiming::Stepped;
         }
         self.offers.push(offer);
+        self.target = self.offers.min();
         if is_cut {
-            self.line = self.target().map(|delay| Line { present_at: first_refresh, delay });
+            self.line = self.target.map(|delay| Line { present_at: first_refresh, delay });
         }
         let limit = interval.map_or(FORWARD_STEP, |interval| interval.scale(LAG_INTERVALS, 1));
         self.lagging = if offer > line.delay + limit { self.lagging + 1 } else { 0 };
@@ -84,17 +90,19 @@ impl ContentClock {
             return KeyTiming::Followed;
         }
         self.offers.keep_newest(LAGGING_KEYS as usize);
+        self.target = self.offers.min();
         self.lagging = 0;
         KeyTiming::Relocked
     }
 
     /// Delay of a frame shown at `present_at`. None before the first key.
     pub(super) fn delay_at(&self, present_at: MonoTime) -> Option<MonoSpan> {
-        let (line, target) = (self.line?, self.target()?);
+        let (line, target) = (self.line?, self.target?);
         let error = target - line.delay;
         let passed = (present_at - line.present_at).max(MonoSpan::ZERO);
         let fastest = passed.scale(1, FASTEST_SLEW_DIVISOR);
-        let slew = error.scale(passed.min(SLEW_TIME).as_ns(), SLEW_TIME.as_ns());
+        let time = if error < MonoSpan::ZERO { TIGHTEN_TIME } else { RELEASE_TIME };
+        let slew = error.scale(passed.min(time).as_ns(), time.as_ns());
         Some(line.delay + slew.clamp(-fastest, fastest))
     }
 
@@ -106,16 +114,14 @@ impl ContentClock {
     fn start_anew(&mut self, first_refresh: MonoTime, offer: MonoSpan) {
         self.offers.clear();
         self.offers.push(offer);
+        self.target = Some(offer);
         self.line = Some(Line { present_at: first_refresh, delay: offer });
         self.lagging = 0;
     }
 
-    fn target(&self) -> Option<MonoSpan> {
-        self.offers.min()
-    }
-
     pub(super) fn verify_invariants(&self) {
         assert_eq!(self.line.is_some(), self.newest.is_some(), "a line without a key: {self:?}");
+        assert_eq!(self.target, self.offers.min(), "a stale target: {self:?}");
         assert!(self.offers.len() <= WINDOW, "window overflow: {}", self.offers.len());
         assert!(self.lagging < LAGGING_KEYS, "a relock was missed: {self:?}");
     }

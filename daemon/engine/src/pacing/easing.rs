@@ -23,14 +23,11 @@ const LONGEST: MonoSpan = MonoSpan::from_ms(50);
 pub(super) struct Easing {
     /// Lead up to which velocity stays full.
     pub(super) full_until: MonoSpan,
-    /// Span after it within which velocity falls to zero. Not negative.
+    /// Span after it within which velocity falls to zero. Positive.
     pub(super) within: MonoSpan,
 }
 
 impl Easing {
-    /// Nothing is known about the cadence of keys: the newest is held.
-    pub(super) const HOLD: Self = Self { full_until: MonoSpan::ZERO, within: MonoSpan::ZERO };
-
     /// Full velocity for a lead of `full_until`, then to rest by min(2 key intervals, 50 ms).
     pub(super) fn after(full_until: MonoSpan, key_interval: MonoSpan) -> Self {
         Self { full_until, within: (key_interval + key_interval).min(LONGEST) }
@@ -43,9 +40,6 @@ impl Easing {
             return lead;
         }
         let over = over.min(self.within);
-        if over <= MonoSpan::ZERO {
-            return self.full_until;
-        }
         self.full_until + over - over.scale(over.as_ns(), 2 * self.within.as_ns())
     }
 }
@@ -67,7 +61,6 @@ mod tests {
         assert_eq!(easing.eased(ms(75)), ms(50));
         assert_eq!(easing.eased(ms(500)), ms(50));
         assert_eq!(Easing::after(ms(10), ms(10)).eased(ms(500)), ms(20));
-        assert_eq!(Easing::HOLD.eased(ms(8)), MonoSpan::ZERO);
     }
 
     proptest! {

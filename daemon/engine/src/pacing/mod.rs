@@ -15,7 +15,8 @@
 //! [`budget`] learns how long before the refresh work has to start. All decisions are integer
 //! arithmetic. The display has a fixed refresh: frames are planned on its grid.
 //!
-//! [`timer`] is the grid of sinks that have no display behind them.
+//! [`timer`] is the grid of sinks that have no display behind them; [`sim`] runs a pacer against a
+//! simulated display and application.
 
 mod budget;
 mod cadence;
@@ -25,6 +26,7 @@ mod easing;
 mod pacer;
 mod recent;
 mod refresh;
+pub mod sim;
 mod timer;
 
 pub use budget::WorkEstimate;

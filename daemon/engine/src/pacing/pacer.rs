@@ -76,9 +76,9 @@ pub struct PacerStatus {
     pub phase_error: Option<MonoSpan>,
     /// Present time minus content time of the newest started frame.
     pub delay: Option<MonoSpan>,
-    /// Expected time from wake to hand-over.
+    /// Expected time from wake to the picture being ready.
     pub work: MonoSpan,
-    /// Time from hand-over to refresh.
+    /// Time from there to the refresh.
     pub margin: MonoSpan,
     /// Events so far.
     pub counts: PacerCounts,
@@ -155,8 +155,9 @@ impl Pacer {
     pub fn plan(&mut self, now: MonoTime) -> Plan {
         self.refresh.anchor_at(now + self.budget());
         let present_at = self.first_reachable(now);
-        let submit_by = (present_at - self.margin()).max(now);
-        let wake_at = (submit_by - self.work()).max(now);
+        let hand_over = self.budget.hand_over(self.refresh.interval());
+        let submit_by = (present_at - hand_over).max(now);
+        let wake_at = (present_at - self.budget()).max(now);
         Plan { wake_at, submit_by, present_at, content_time: self.content_time_at(present_at) }
     }
 
@@ -166,7 +167,13 @@ impl Pacer {
             return; // the same plan again: its refresh is taken already
         }
         self.last_target = Some(plan.present_at);
-        if let Some(delay) = self.delay_at(plan.present_at) {
+        let shows_key = !self.interpolates && plan.content_time == self.newest;
+        let delay = match self.newest {
+            // The line goes on from the key: if only the frame moved, the next one would move back.
+            Some(newest) if shows_key => Some(plan.present_at - newest),
+            _ => self.delay_at(plan.present_at),
+        };
+        if let Some(delay) = delay {
             self.clock.go_on_from(plan.present_at, delay);
         }
         self.last_content = plan.content_time;

@@ -12,8 +12,9 @@ use crate::time::{MonoSpan, MonoTime};
 const FRACTION: u32 = 16;
 /// Gain of the phase, as a divisor. At 8, timestamp noise is damped to a quarter.
 const ALPHA_DIVISOR: i128 = 8;
-/// Gain of the interval, as a divisor: near alpha^2 / (2 - alpha), which just does not overshoot.
-const BETA_DIVISOR: i128 = 128;
+/// Gain of the interval, as a divisor. Critical damping would allow alpha^2 / (2 - alpha) = 1/120;
+/// a quarter of it follows crystals that drift by ppm just as well and doubles the quiet.
+const BETA_DIVISOR: i128 = 512;
 /// A timestamp farther from the grid than this share of the interval is an outlier, in percent.
 const GATE_PERCENT: i128 = 35;
 /// So many outliers in a row mean that the grid has moved, not the timestamps.
