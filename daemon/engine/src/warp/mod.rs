@@ -5,6 +5,7 @@
 
 pub mod blend;
 pub mod gather;
+pub mod grid;
 pub mod sample;
 
 use crate::key::Velocity;
