@@ -16,6 +16,7 @@ use crate::method::Method;
 use crate::phase::Phase;
 use crate::time::{MonoSpan, MonoTime};
 use crate::warp;
+use crate::warp::grid::GridScratch;
 
 /// What an engine does and with how much of the machine.
 #[derive(Clone, Copy, Debug)]
@@ -85,6 +86,7 @@ pub struct Engine {
 struct Scratch {
     decode: DecodeScratch,
     map: FieldMap,
+    grid: GridScratch,
 }
 
 impl Engine {
@@ -151,6 +153,7 @@ impl Engine {
             let cells = [key.velocity.width(), key.velocity.height()];
             self.scratch.map.update(key.valid, cells, key.field_offset);
         }
+        self.scratch.grid.forget_key();
         let newest = self.newest.replace(key);
         let dropped = std::mem::replace(&mut self.previous, newest);
         self.spare = dropped.unwrap_or_default();
@@ -184,7 +187,10 @@ impl Engine {
             Method::Gather => {
                 warp::gather::warp_gather(&self.pool, key, &self.scratch.map, phase, out);
             }
-            Method::Hold | Method::Grid | Method::Linear => out.copy_from(&key.color),
+            Method::Grid => {
+                warp::grid::warp_grid(key, phase, out, &mut self.scratch.grid, &self.pool);
+            }
+            Method::Hold | Method::Linear => out.copy_from(&key.color),
         }
         Some(FrameReport { key_index: key.index, phase, work: (self.config.timer)() - started_at })
     }

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use super::pyramid::{Field, difference};
 use super::triangle::{Point, cross};
+use crate::field::{FieldAxis, FieldMap};
 use crate::key::{KeyFrame, Velocity};
 use crate::phase::Phase;
 use crate::plane::Rect;
@@ -46,6 +47,8 @@ pub(super) enum Diagonal {
 pub(super) struct Mesh {
     /// Vertices per row, frame included.
     columns: usize,
+    /// Where the cells of the key's field lie.
+    map: FieldMap,
     /// Row by row; `columns * rows` of them.
     vertices: Vec<Vertex>,
     /// Positions at the phase of the last [`Mesh::advance`], 1/16 px.
@@ -69,6 +72,7 @@ impl Mesh {
     pub(super) fn snap(&mut self, key: &KeyFrame) {
         let field = Field { velocity: &key.velocity, depth: &key.depth };
         let layout = Layout::new(key.valid, key.velocity.width(), key.velocity.height());
+        self.map.update(key.valid, [layout.width, layout.height], key.field_offset);
         if !key.depth.data().is_empty() {
             let size = (key.depth.width(), key.depth.height());
             assert_eq!(size, (layout.width, layout.height), "depth and velocity share one grid");
@@ -80,9 +84,10 @@ impl Mesh {
         self.diagonals.resize((columns - 1) * (rows - 1), Diagonal::Falling);
         self.extents.resize(rows - 1, [0; 2]);
 
+        let map = &self.map;
         self.vertices.par_chunks_mut(columns).zip(0..layout.rows()).for_each(|(line, row)| {
             for (vertex, column) in line.iter_mut().zip(0..) {
-                *vertex = layout.vertex(&field, column, row);
+                *vertex = layout.vertex(map, &field, column, row);
             }
         });
         let vertices = &self.vertices;
@@ -175,7 +180,6 @@ fn sixteenths(q8: i32) -> i32 {
 /// How neighbourhoods cover the field and the field covers the picture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Layout {
-    valid: Rect,
     /// Cells of the field per row.
     width: u32,
     /// Rows of cells of the field.
@@ -198,7 +202,7 @@ impl Layout {
             (true, false) => 4,
             (false, false) => 8,
         };
-        Self { valid, width, height, side }
+        Self { width, height, side }
     }
 
     /// Vertices per row, frame included.
@@ -219,7 +223,7 @@ impl Layout {
         Rect { x, y, width, height }
     }
 
-    fn vertex(&self, field: &Field<'_>, column: u32, row: u32) -> Vertex {
+    fn vertex(&self, map: &FieldMap, field: &Field<'_>, column: u32, row: u32) -> Vertex {
         let inner_column = column.clamp(1, self.columns() - 2);
         let inner_row = row.clamp(1, self.rows() - 2);
         let cells = self.neighbourhood(inner_column, inner_row);
@@ -228,39 +232,36 @@ impl Layout {
             let offset = field.snap(cells, regular).offset();
             let x = regular[0].wrapping_add_signed(offset[0]);
             let y = regular[1].wrapping_add_signed(offset[1]);
-            let source = [self.center_x(x), self.center_y(y)];
+            let source = [centre(&map.x, x), centre(&map.y, y)];
             return Vertex { source, velocity: field.velocity(x, y), depth: field.depth(x, y) };
         }
         let source = [
-            on_frame(column, self.columns(), self.valid.x, self.valid.width)
-                .unwrap_or_else(|| self.center_x(regular[0])),
-            on_frame(row, self.rows(), self.valid.y, self.valid.height)
-                .unwrap_or_else(|| self.center_y(regular[1])),
+            on_frame(&map.x, column, self.columns()).unwrap_or_else(|| centre(&map.x, regular[0])),
+            on_frame(&map.y, row, self.rows()).unwrap_or_else(|| centre(&map.y, regular[1])),
         ];
         let depth = field.depth(regular[0], regular[1]);
         Vertex { source, velocity: Velocity::default(), depth }
     }
-
-    fn center_x(&self, cell: u32) -> i32 {
-        center(cell, self.width, self.valid.x, self.valid.width)
-    }
-
-    fn center_y(&self, cell: u32) -> i32 {
-        center(cell, self.height, self.valid.y, self.valid.height)
-    }
 }
 
-/// Centre of a field cell, 1/16 px, for `cells` of them over `length` pixels from `start`.
-fn center(cell: u32, cells: u32, start: u32, length: u32) -> i32 {
-    (start * 16 + (2 * cell + 1) * length * 8 / cells).cast_signed() - 8
+/// Centre of a field cell, 1/16 px. Jitter may carry it past the frame; the vertex stops there.
+fn centre(axis: &FieldAxis, cell: u32) -> i32 {
+    let [first, last] = frame(axis);
+    ((axis.centre(cell) + 8) >> 4).clamp(first, last)
 }
 
-/// Position of the frame, 1/16 px, if `index` of `count` vertices is on it.
-fn on_frame(index: u32, count: u32, start: u32, length: u32) -> Option<i32> {
+/// Where the frame lies, 1/16 px: the outer edges of the first and the last pixel.
+fn frame(axis: &FieldAxis) -> [i32; 2] {
     let edge = |pixels: u32| (pixels * 16).cast_signed() - 8;
+    [edge(axis.first_pixel()), edge(axis.first_pixel() + axis.pixels())]
+}
+
+/// Position of the frame if `index` of `count` vertices is on it.
+fn on_frame(axis: &FieldAxis, index: u32, count: u32) -> Option<i32> {
+    let [first, last] = frame(axis);
     match index {
-        0 => Some(edge(start)),
-        _ if index + 1 == count => Some(edge(start + length)),
+        0 => Some(first),
+        _ if index + 1 == count => Some(last),
         _ => None,
     }
 }

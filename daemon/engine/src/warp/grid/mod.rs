@@ -51,17 +51,27 @@ use crate::plane::Plane;
 use mesh::Mesh;
 use raster::Bands;
 
-/// Buffers that [`warp_grid`] reuses: it allocates only when a key is larger than all before it.
+/// Buffers that [`warp_grid`] reuses, and the mesh of one key: it is snapped with the first frame
+/// after [`GridScratch::forget_key`] and serves the frames that follow. Allocates only when a key
+/// is larger than all before it.
 #[derive(Debug, Default)]
 pub struct GridScratch {
     mesh: Mesh,
+    is_snapped: bool,
     bands: Bands,
+}
+
+impl GridScratch {
+    /// The next frame is of another key. To be called whenever the key changes.
+    pub fn forget_key(&mut self) {
+        self.is_snapped = false;
+    }
 }
 
 /// Makes the in-between frame at `phase` after `key` into `out`.
 ///
 /// Without usable motion the key is copied. Pixels outside `key.valid` are always copied. A key
-/// without depth has the same depth everywhere. The result does not depend on the threads of `pool`.
+/// without depth has the same depth everywhere. `scratch` has been told of each change of key. The result does not depend on the threads of `pool`.
 ///
 /// # Panics
 /// If `out` does not have the size and format of the key's colour, or a non-empty depth does not
@@ -103,7 +113,10 @@ fn warp_texels<T: Texel>(
         return;
     }
     pool.install(|| {
-        scratch.mesh.snap(key);
+        if !scratch.is_snapped {
+            scratch.mesh.snap(key);
+            scratch.is_snapped = true;
+        }
         scratch.mesh.advance(phase);
         scratch.bands.draw(&scratch.mesh, color, key.valid, out);
     });

@@ -117,67 +117,98 @@ impl Field<'_> {
             .unwrap_or(0)
     }
 
-    /// Code of the gradient at a cell, one-sided as the head of this file says.
-    pub(super) fn gradient(&self, x: u32, y: u32) -> u16 {
-        let here = self.velocity(x, y);
-        let mut largest = 0;
-        let mut compare = |to_x: u32, to_y: u32| {
-            let there = self.velocity(to_x, to_y);
-            let code = magnitude_code(difference(here, there));
-            if code > largest && self.is_in_front([x, y], here, [to_x, to_y], there) {
-                largest = code;
-            }
-        };
-        if x > 0 {
-            compare(x - 1, y);
-        }
-        if x + 1 < self.velocity.width() {
-            compare(x + 1, y);
-        }
-        if y > 0 {
-            compare(x, y - 1);
-        }
-        if y + 1 < self.velocity.height() {
-            compare(x, y + 1);
-        }
-        largest
-    }
-
-    fn is_in_front(&self, a: [u32; 2], va: Velocity, b: [u32; 2], vb: Velocity) -> bool {
-        let (depth_a, depth_b) = (self.depth(a[0], a[1]), self.depth(b[0], b[1]));
-        depth_a > depth_b || (depth_a == depth_b && speed(va) >= speed(vb))
-    }
-
     /// The entry of the neighbourhood `cells`, relative to `regular`.
     pub(super) fn snap(&self, cells: Rect, regular: [u32; 2]) -> Entry {
-        if self.is_smooth(cells) {
+        let motion = self.motion_around(cells);
+        if is_smooth(&motion) {
             return Entry::new(0, [0, 0]);
         }
+        let gradients = gradients(&motion, &self.depth_around(cells));
         let mut level = [[Entry::ABSENT; LARGEST]; LARGEST];
-        for (row, y) in level.iter_mut().zip(cells.y..cells.y + cells.height) {
-            for (entry, x) in row.iter_mut().zip(cells.x..cells.x + cells.width) {
+        for ((row, codes), y) in
+            level.iter_mut().zip(gradients).zip(cells.y..cells.y + cells.height)
+        {
+            for ((entry, code), x) in row.iter_mut().zip(codes).zip(cells.x..cells.x + cells.width)
+            {
                 let offset = [x.wrapping_sub(regular[0]), y.wrapping_sub(regular[1])];
-                *entry = Entry::new(self.gradient(x, y), offset.map(u32::cast_signed));
+                *entry = Entry::new(code, offset.map(u32::cast_signed));
             }
         }
         maximum(level)
     }
 
-    /// Whether no two velocities in `cells` and the cells around them differ enough to count.
-    fn is_smooth(&self, cells: Rect) -> bool {
-        let left = cells.x.saturating_sub(1) as usize;
-        let right = (cells.x + cells.width + 1).min(self.velocity.width()) as usize;
-        let top = cells.y.saturating_sub(1);
-        let bottom = (cells.y + cells.height + 1).min(self.velocity.height());
-        let (mut low, mut high) = ([i16::MAX; 2], [i16::MIN; 2]);
-        for y in top..bottom {
-            for velocity in &self.velocity.row(y)[left..right] {
-                low = [low[0].min(velocity.x), low[1].min(velocity.y)];
-                high = [high[0].max(velocity.x), high[1].max(velocity.y)];
+    /// Velocities of `cells` and one cell around; beyond the field its border goes on.
+    fn motion_around(&self, cells: Rect) -> Window<Velocity> {
+        let (width, height) = (self.velocity.width(), self.velocity.height());
+        let columns: [u32; WINDOW] = around(cells.x, width, 1);
+        around::<WINDOW>(cells.y, height, 1).map(|y| {
+            let row = self.velocity.row(y);
+            columns.map(|x| held(row[x as usize]))
+        })
+    }
+
+    /// [`Field::depth`] of the same cells.
+    fn depth_around(&self, cells: Rect) -> Window<u32> {
+        let mut nearest = [[0; WINDOW]; WINDOW];
+        if self.depth.data().is_empty() {
+            return nearest;
+        }
+        const WIDER: usize = WINDOW + 2;
+        let columns: [u32; WIDER] = around(cells.x, self.depth.width(), 2);
+        let rows = around::<WIDER>(cells.y, self.depth.height(), 2).map(|y| {
+            let depths = columns.map(|x| self.depth.row(y)[x as usize]);
+            std::array::from_fn(|x| depths[x].max(depths[x + 1]).max(depths[x + 2]))
+        });
+        for (y, row) in nearest.iter_mut().enumerate() {
+            let [above, here, below]: [[u32; WINDOW]; 3] = [rows[y], rows[y + 1], rows[y + 2]];
+            *row = std::array::from_fn(|x| above[x].max(here[x]).max(below[x]));
+        }
+        nearest
+    }
+}
+
+/// Cells per axis of a neighbourhood and one cell around it.
+const WINDOW: usize = LARGEST + 2;
+
+type Window<T> = [[T; WINDOW]; WINDOW];
+
+/// Indices from `margin` before `first` on, kept inside `0..count`.
+fn around<const N: usize>(first: u32, count: u32, margin: u32) -> [u32; N] {
+    let mut at = 0;
+    [(); N].map(|()| {
+        let index = (first + at).saturating_sub(margin).min(count - 1);
+        at += 1;
+        index
+    })
+}
+
+/// Codes of the gradients of a neighbourhood, one-sided as the head of this file says.
+fn gradients(motion: &Window<Velocity>, depth: &Window<u32>) -> [[u16; LARGEST]; LARGEST] {
+    let mut codes = [[0; LARGEST]; LARGEST];
+    for (y, row) in codes.iter_mut().enumerate() {
+        for (x, code) in row.iter_mut().enumerate() {
+            let (here, here_depth) = (motion[y + 1][x + 1], depth[y + 1][x + 1]);
+            for (there_y, there_x) in [(y, x + 1), (y + 1, x), (y + 1, x + 2), (y + 2, x + 1)] {
+                let (there, there_depth) = (motion[there_y][there_x], depth[there_y][there_x]);
+                let is_in_front = here_depth > there_depth
+                    || (here_depth == there_depth && speed(here) >= speed(there));
+                if is_in_front {
+                    *code = magnitude_code(difference(here, there)).max(*code);
+                }
             }
         }
-        (0..2).all(|axis| i32::from(high[axis]) - i32::from(low[axis]) < SMALLEST_STEP)
     }
+    codes
+}
+
+/// Whether no two velocities of a window differ enough to count.
+fn is_smooth(motion: &Window<Velocity>) -> bool {
+    let (mut low, mut high) = ([i16::MAX; 2], [i16::MIN; 2]);
+    for velocity in motion.as_flattened() {
+        low = [low[0].min(velocity.x), low[1].min(velocity.y)];
+        high = [high[0].max(velocity.x), high[1].max(velocity.y)];
+    }
+    (0..2).all(|axis| i32::from(high[axis]) - i32::from(low[axis]) < SMALLEST_STEP)
 }
 
 fn held(velocity: Velocity) -> Velocity {

@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 
 use super::mesh::{Layout, Mesh, MeshTriangle};
-use super::pyramid::{Entry, Field, LARGEST, magnitude_code, maximum};
+use super::pyramid::{Entry, Field, LARGEST, difference, magnitude_code, maximum};
 use super::triangle::{Point, SourceMap, cross};
 use super::{GridScratch, warp_grid};
 use crate::color::{ColorFormat, ColorPlane, OrderedRgba16, Rgb10a2, Rgba8};
@@ -23,15 +23,12 @@ fn scramble(index: u32) -> u32 {
 fn still_key(width: u32, height: u32, field: [u32; 2]) -> KeyFrame {
     let texels = (0..width * height).map(|i| Rgba8(scramble(i))).collect();
     KeyFrame {
-        index: 0,
         content_time: MonoTime::from_ns(1),
         motion_from: Some(MonoTime::ZERO),
-        is_cut: false,
         color: ColorPlane::Rgba8(Plane::from_vec(width, height, texels)),
         valid: Rect::full(width, height),
-        depth: Plane::default(),
         velocity: Plane::new(field[0], field[1]),
-        camera: None,
+        ..KeyFrame::default()
     }
 }
 
@@ -130,6 +127,37 @@ fn reference(key: &KeyFrame, phase: Phase) -> Plane<Rgba8> {
     out
 }
 
+/// Code and place, relative to `regular`, of the largest one-sided gradient in `cells`; of equal
+/// ones the nearest to `regular`, then topmost, then leftmost.
+fn search(field: &Field<'_>, cells: Rect, regular: [u32; 2]) -> (u16, [i32; 2]) {
+    let speed = |v: Velocity| i32::from(v.x).abs() + i32::from(v.y).abs();
+    let gradient = |x: u32, y: u32| {
+        let steps = [(-1, 0), (1, 0), (0, -1), (0, 1)];
+        let around = steps.into_iter().filter_map(|(dx, dy)| {
+            let (x, y) = (x.checked_add_signed(dx)?, y.checked_add_signed(dy)?);
+            (x < field.velocity.width() && y < field.velocity.height()).then_some((x, y))
+        });
+        let (here, depth) = (field.velocity(x, y), field.depth(x, y));
+        let behind = around.filter(|&(x, y)| {
+            depth > field.depth(x, y)
+                || (depth == field.depth(x, y) && speed(here) >= speed(field.velocity(x, y)))
+        });
+        behind
+            .map(|(x, y)| magnitude_code(difference(here, field.velocity(x, y))))
+            .max()
+            .unwrap_or(0)
+    };
+    (cells.y..cells.y + cells.height)
+        .flat_map(|y| (cells.x..cells.x + cells.width).map(move |x| [x, y]))
+        .map(|[x, y]| {
+            let offset =
+                [0, 1].map(|axis| [x, y][axis].cast_signed() - regular[axis].cast_signed());
+            (gradient(x, y), offset)
+        })
+        .min_by_key(|&(code, [x, y])| (std::cmp::Reverse(code), x.abs() + y.abs(), y, x))
+        .expect("a neighbourhood has cells")
+}
+
 prop_compose! {
     /// Blocks of motion and depth on a field of any ratio from 1 to 4 to the picture.
     fn any_key()(
@@ -139,10 +167,12 @@ prop_compose! {
         block in 1..12_u32,
         limit in prop_oneof![Just(40_i32), Just(700), Just(32767)],
         has_depth: bool,
+        jitter in prop_oneof![Just([0, 0]), [-600..600_i32, -600..600_i32]],
         seed: u32,
     ) -> KeyFrame {
         let field = [(width * 4 / ratio.0).max(1), (height * 4 / ratio.1).max(1)];
         let mut key = still_key(width, height, field);
+        key.field_offset = jitter;
         set_field(&mut key, |x, y| {
             let noise = scramble(seed ^ (x / block) ^ (y / block) << 10);
             let axis = |bits: u32| {
@@ -218,12 +248,17 @@ proptest! {
                 }
                 let cells = layout.neighbourhood(column, row);
                 covered += cells.width * cells.height;
-                let inside = |at: i32, first: u32, count: u32, of: u32, pixels: u32| {
+                // Within rounding to 1/16 px; jitter carries neighbourhoods along, up to the frame.
+                let inside = |at: i32, axis: usize, first: u32, count: u32, of: u32, pixels: u32| {
                     let edge = |cell: u32| i64::from(cell) * i64::from(pixels) * 16 / i64::from(of) - 8;
-                    i64::from(at) >= edge(first) && i64::from(at) <= edge(first + count)
+                    let jitter = i64::from(key.field_offset[axis]) / 16;
+                    let frame = [-8, i64::from(pixels) * 16 - 8];
+                    let [low, high] = [edge(first) + jitter - 1, edge(first + count) + jitter + 1]
+                        .map(|place| place.clamp(frame[0], frame[1]));
+                    (low..=high).contains(&i64::from(at))
                 };
-                prop_assert!(inside(x, cells.x, cells.width, field[0], key.valid.width));
-                prop_assert!(inside(y, cells.y, cells.height, field[1], key.valid.height));
+                prop_assert!(inside(x, 0, cells.x, cells.width, field[0], key.valid.width));
+                prop_assert!(inside(y, 1, cells.y, cells.height, field[1], key.valid.height));
             }
         }
         prop_assert_eq!(covered, field[0] * field[1], "neighbourhoods cover the field once");
@@ -251,16 +286,17 @@ proptest! {
     }
 
     #[test]
-    fn a_neighbourhood_is_left_out_as_smooth_only_if_every_gradient_in_it_is_zero(key in any_key()) {
+    fn a_vertex_stands_where_a_search_of_every_cell_finds_the_largest_gradient(key in any_key()) {
         let field = Field { velocity: &key.velocity, depth: &key.depth };
         let layout = Layout::new(key.valid, key.velocity.width(), key.velocity.height());
-        let cells = layout.neighbourhood(1, 1);
-        let found = field.snap(cells, [cells.x + cells.width / 2, cells.y + cells.height / 2]);
-        let largest = (cells.y..cells.y + cells.height)
-            .flat_map(|y| (cells.x..cells.x + cells.width).map(move |x| (x, y)))
-            .map(|(x, y)| field.gradient(x, y))
-            .max();
-        prop_assert_eq!(Some(found.magnitude()), largest);
+        for row in 1..layout.rows() - 1 {
+            for column in 1..layout.columns() - 1 {
+                let cells = layout.neighbourhood(column, row);
+                let regular = [cells.x + cells.width / 2, cells.y + cells.height / 2];
+                let found = field.snap(cells, regular);
+                prop_assert_eq!((found.magnitude(), found.offset()), search(&field, cells, regular));
+            }
+        }
     }
 
     #[test]
@@ -424,11 +460,12 @@ fn pixels_outside_the_valid_rectangle_are_copied() {
 }
 
 #[test]
-fn scratch_from_another_key_changes_nothing() {
+fn scratch_that_was_told_of_each_key_gives_what_a_new_one_gives() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
     let mut scratch = GridScratch::default();
     for key in [square_over_ground(2, 1), still_key(30, 20, [15, 10]), square_over_ground(9, 3)] {
         let mut out = ColorPlane::new(ColorFormat::Rgba8, key.color.width(), key.color.height());
+        scratch.forget_key();
         warp_grid(&key, Phase::ONE, &mut out, &mut scratch, &pool);
         assert!(out == warp(&key, Phase::ONE, 1));
     }
