@@ -16,6 +16,14 @@ const HALF_MAX: u16 = 0x7bff;
 const HALF_EXPONENT: u16 = 0x7c00;
 const HALF_SIGN: u16 = 0x8000;
 
+/// The part of the output that shows the image of a key with this colour plane.
+pub(super) fn image_rect(format: &StreamFormat, plane: &CheckedPlane<'_>) -> Rect {
+    match format.valid_rect_use {
+        ValidRectUse::Letterbox => plane.valid,
+        ValidRectUse::Stretch => Rect::full(format.width, format.height),
+    }
+}
+
 /// Reads `plane` into `color` and returns the rectangle of it that moves. `whole` keeps the plane
 /// as it came while its valid rectangle is stretched.
 pub(super) fn decode_color(
@@ -25,8 +33,8 @@ pub(super) fn decode_color(
     whole: &mut ColorPlane,
     color: &mut ColorPlane,
 ) -> Rect {
-    let full = Rect::full(format.width, format.height);
-    let stretch = format.valid_rect_use == ValidRectUse::Stretch && plane.valid != full;
+    let image = image_rect(format, plane);
+    let stretch = plane.valid != image;
     let target = if stretch { &mut *whole } else { &mut *color };
     target.reset(format.color, format.width, format.height);
     match target {
@@ -39,7 +47,7 @@ pub(super) fn decode_color(
         ColorPlane::Rgba16f(target) => read(pool, plane, target, ordered_from_bytes),
     }
     if !stretch {
-        return plane.valid;
+        return image;
     }
     color.reset(format.color, format.width, format.height);
     match (&*whole, color) {
@@ -52,7 +60,7 @@ pub(super) fn decode_color(
         }
         _ => unreachable!("both were reset to the stream's format"),
     }
-    full
+    image
 }
 
 fn read<T: Texel, const N: usize>(

@@ -64,6 +64,11 @@ impl<'a> FieldInput<'a> {
         })
     }
 
+    /// Offset of the samples in cells: a cell of centre c shows the image at c + jitter.
+    pub(super) fn jitter(&self) -> [f32; 2] {
+        self.jitter
+    }
+
     pub(super) fn has_depth(&self) -> bool {
         self.depth.is_some()
     }

@@ -16,8 +16,10 @@ mod error;
 mod field;
 mod geometry;
 mod motion;
+mod motion_field;
 
 pub use error::{DecodeError, PlaneName};
+pub use motion_field::{MotionField, decode_field};
 
 use rayon::ThreadPool;
 
@@ -85,11 +87,7 @@ pub fn decode_key(
     if input.is_cut {
         return Ok(report);
     }
-    let lacks_camera =
-        format.motion.is_some_and(|motion| motion.camera_motion == CameraMotion::Missing);
-    if lacks_camera
-        && (planes.depth.is_none() || input.camera.is_none() || input.motion_from_camera.is_none())
-    {
+    if lacks_camera_motion(format, input, &planes) {
         report.lacks_camera_motion = true;
         return Ok(report);
     }
@@ -98,6 +96,16 @@ pub fn decode_key(
     dilate_motion(pool, &params, &key.depth, &scratch.displacement, &mut key.velocity);
     key.motion_from = input.motion_from;
     Ok(report)
+}
+
+/// Whether vectors lack the camera's motion, and something that it is worked out from is missing.
+fn lacks_camera_motion(
+    format: &StreamFormat,
+    input: &KeyInput<'_>,
+    planes: &CheckedKey<'_>,
+) -> bool {
+    format.motion.is_some_and(|motion| motion.camera_motion == CameraMotion::Missing)
+        && (planes.depth.is_none() || input.camera.is_none() || input.motion_from_camera.is_none())
 }
 
 /// The planes of a key, each checked on its own and against the stream.
