@@ -10,7 +10,6 @@ use std::f64::consts::PI;
 use super::super::Srgb8;
 use super::super::blur::{along_x, along_y, taps};
 use super::color::opponent_of;
-use crate::score::picture::srgb_decode;
 
 /// (a, b) of the Gaussians of one channel; b in square degrees.
 type Sensitivity = &'static [(f64, f64)];
@@ -25,9 +24,14 @@ const WIDEST_B: f64 = 0.04;
 /// Taps beyond this share of the sum are below what a float adds to it.
 const NEGLIGIBLE: f64 = 1e-9;
 
+/// Linear light of an encoded channel, both 0 to 1 (IEC 61966-2-1).
+fn linear_of_srgb(encoded: f32) -> f32 {
+    if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+}
+
 /// The YCxCz planes of a picture.
 pub(super) fn opponent_planes(picture: &Srgb8) -> [Plane<f32>; 3] {
-    let table: [f32; 256] = std::array::from_fn(|v| srgb_decode(v as f32 / 255.0));
+    let table: [f32; 256] = std::array::from_fn(|v| linear_of_srgb(v as f32 / 255.0));
     let mut planes = [0; 3].map(|_| Plane::new(picture.width(), picture.height()));
     for (i, pixel) in picture.data().iter().enumerate() {
         let opponent = opponent_of(pixel.map(|level| table[usize::from(level)]));

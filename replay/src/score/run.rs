@@ -1,0 +1,200 @@
+//! The scoring protocol: keys in order to one engine per method, frames out, compared with truth.
+//!
+//! A method that extrapolates has been given nothing later than the newest key when it makes its
+//! frames. One that interpolates is given the next key first, unless a cut lies before that key:
+//! then it has no more to go by than the others. Work times are the engine's own reports, and
+//! while an engine works nothing else runs here; comparing is done afterwards, in parallel.
+
+use std::num::NonZeroUsize;
+
+use anyhow::Context as _;
+use foreframe_engine::{ColorPlane, Engine, EngineConfig, Method, MonoTime, Plane, StreamFormat};
+use foreframed::sink::srgb::SrgbConverter;
+use rayon::prelude::*;
+
+use super::picture::{Srgb8, to_srgb8};
+use super::report::{CaptureScore, MotionCounts};
+use super::tally::{FrameScore, MethodTally, Truth};
+use crate::recording::keys::KeyReader;
+use crate::recording::plan::{MotionSource, Plan};
+use crate::recording::{Frame, Recording, Wanted};
+
+/// What to score and how.
+#[derive(Clone, Debug)]
+pub struct ScoreOptions {
+    /// The methods, in the order of the report.
+    pub methods: Vec<Method>,
+    /// Frames from key to key.
+    pub ratio: NonZeroUsize,
+    /// Threads of the engine.
+    pub threads: NonZeroUsize,
+    /// The clock of the engine's work reports.
+    pub timer: fn() -> MonoTime,
+}
+
+/// Scores one recording. `on_key` is called after each key.
+///
+/// # Errors
+/// If a frame cannot be read or the engine refuses it.
+pub fn score_recording(
+    name: &str,
+    recording: &mut dyn Recording,
+    options: &ScoreOptions,
+    mut on_key: impl FnMut(),
+) -> anyhow::Result<CaptureScore> {
+    let plan = Plan::new(recording.heads(), options.ratio);
+    let reader = KeyReader::new(recording.format(), &plan)?;
+    let format = *reader.format();
+    let converter = SrgbConverter::new(&format);
+    let mut truths = TruthReader::new(*recording.format(), options);
+    let mut runs: Vec<_> =
+        options.methods.iter().map(|method| MethodRun::new(*method, format, options)).collect();
+
+    let mut key = reader.read(recording, &plan, 0)?;
+    for index in 0..plan.keys.len() {
+        let next = match index + 1 < plan.keys.len() {
+            true => Some(reader.read(recording, &plan, index + 1)?),
+            false => None,
+        };
+        let predicted = plan.predicted(index);
+        let times: Vec<_> =
+            predicted.clone().map(|frame| recording.heads()[frame].content_time).collect();
+        for run in &mut runs {
+            run.make(&key, next.as_ref(), &times)
+                .with_context(|| format!("key frame {}", plan.keys[index].frame))?;
+        }
+        let truths: Vec<_> = predicted
+            .map(|frame| truths.read(recording, frame))
+            .collect::<anyhow::Result<Vec<_>>>()?
+            .into_par_iter()
+            .map(Truth::new)
+            .collect();
+        let is_whole = plan.left_out(index) == 0;
+        let size = (format.width, format.height);
+        runs.par_iter_mut().for_each(|run| {
+            let frames: Vec<_> = run
+                .outputs
+                .par_iter()
+                .zip(&truths)
+                .map(|(output, truth)| FrameScore::of(&to_srgb8(output, &converter), truth))
+                .collect();
+            run.tally.add_frames(&frames, size, is_whole);
+        });
+        on_key();
+        match next {
+            Some(next) => key = next,
+            None => break,
+        }
+    }
+    Ok(CaptureScore {
+        name: name.to_owned(),
+        width: format.width,
+        height: format.height,
+        ratio: options.ratio.get(),
+        keys: plan.keys.len(),
+        left_out: (0..plan.keys.len()).map(|key| plan.left_out(key)).sum(),
+        key_motion: count_motion(&plan),
+        methods: runs.iter().map(|run| run.tally.finish()).collect(),
+    })
+}
+
+fn count_motion(plan: &Plan) -> MotionCounts {
+    let mut counts = MotionCounts::default();
+    for key in &plan.keys {
+        match key.motion {
+            MotionSource::Own { .. } => counts.own += 1,
+            MotionSource::Composed { .. } => counts.composed += 1,
+            MotionSource::None => counts.missing += 1,
+        }
+    }
+    counts
+}
+
+fn engine_of(method: Method, format: StreamFormat, options: &ScoreOptions) -> Engine {
+    let config = EngineConfig {
+        method,
+        threads: options.threads,
+        // Damping is for eyes, and the metrics have none.
+        pixels_per_degree: None,
+        timer: options.timer,
+    };
+    Engine::new(format, config)
+}
+
+/// One method on its way through a recording.
+struct MethodRun {
+    method: Method,
+    engine: Engine,
+    newest: Option<u64>,
+    outputs: Vec<ColorPlane>,
+    tally: MethodTally,
+}
+
+impl MethodRun {
+    fn new(method: Method, format: StreamFormat, options: &ScoreOptions) -> Self {
+        Self {
+            method,
+            engine: engine_of(method, format, options),
+            newest: None,
+            outputs: Vec::new(),
+            tally: MethodTally::new(method, options.ratio.get()),
+        }
+    }
+
+    /// Makes the frames that show `times`, between `key` and `next`, into `outputs`.
+    fn make(
+        &mut self,
+        key: &Frame,
+        next: Option<&Frame>,
+        times: &[MonoTime],
+    ) -> anyhow::Result<()> {
+        self.push(key)?;
+        if let Some(next) = next.filter(|next| self.method.interpolates() && !next.is_cut) {
+            self.push(next)?;
+        }
+        self.outputs.resize_with(times.len(), || ColorPlane::Rgba8(Plane::default()));
+        for (time, output) in times.iter().zip(&mut self.outputs) {
+            let report = self.engine.synthesise(*time, output).context("the engine has no key")?;
+            self.tally.add_frame_work(report.work);
+        }
+        Ok(())
+    }
+
+    /// Gives the engine a key, unless it has been given it already.
+    fn push(&mut self, key: &Frame) -> anyhow::Result<()> {
+        if self.newest != Some(key.index) {
+            let report = self.engine.push_key(&key.as_input())?;
+            self.tally.add_key_work(report.work);
+            self.newest = Some(key.index);
+        }
+        Ok(())
+    }
+}
+
+/// Reads ground truths through the engine's own decoder.
+struct TruthReader {
+    converter: SrgbConverter,
+    engine: Engine,
+    picture: ColorPlane,
+}
+
+impl TruthReader {
+    fn new(format: StreamFormat, options: &ScoreOptions) -> Self {
+        let engine = engine_of(Method::Hold, format, options);
+        let converter = SrgbConverter::new(&format);
+        Self { converter, engine, picture: ColorPlane::Rgba8(Plane::default()) }
+    }
+
+    fn read(&mut self, recording: &mut dyn Recording, frame: usize) -> anyhow::Result<Srgb8> {
+        let context = || format!("ground truth, frame {frame}");
+        let truth = recording.read(frame, Wanted::Color).with_context(context)?;
+        self.engine.push_key(&truth.as_input()).with_context(context)?;
+        self.engine
+            .synthesise(truth.content_time, &mut self.picture)
+            .context("the engine has no key")?;
+        Ok(to_srgb8(&self.picture, &self.converter))
+    }
+}
+
+#[cfg(test)]
+mod tests;
