@@ -43,3 +43,23 @@ pub fn for_each_chunk<T: Send>(
             .for_each(|(y, part)| chunk(y as u32, part));
     });
 }
+
+/// Calls `band(first_row, rows of a, rows of b)` for every run of `rows` rows of two planes of the
+/// same width.
+#[expect(clippy::cast_possible_truncation, reason = "planes have at most 8192 rows")]
+pub fn for_each_band<A: Send, B: Send>(
+    pool: &ThreadPool,
+    a: &mut Plane<A>,
+    b: &mut Plane<B>,
+    rows: usize,
+    band: impl Fn(u32, &mut [A], &mut [B]) + Sync,
+) {
+    let length = rows * a.width() as usize;
+    if length == 0 {
+        return;
+    }
+    pool.install(|| {
+        let parts = a.data_mut().par_chunks_mut(length).zip(b.data_mut().par_chunks_mut(length));
+        parts.enumerate().for_each(|(i, (a, b))| band((i * rows) as u32, a, b));
+    });
+}

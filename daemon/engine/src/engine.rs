@@ -17,6 +17,7 @@ use crate::phase::Phase;
 use crate::time::{MonoSpan, MonoTime};
 use crate::warp;
 use crate::warp::grid::GridScratch;
+use crate::warp::linear::LinearScratch;
 
 /// What an engine does and with how much of the machine.
 #[derive(Clone, Copy, Debug)]
@@ -87,6 +88,9 @@ struct Scratch {
     decode: DecodeScratch,
     map: FieldMap,
     grid: GridScratch,
+    linear: LinearScratch,
+    /// Content time of the key that `linear` has taken.
+    linear_key: Option<MonoTime>,
 }
 
 impl Engine {
@@ -152,6 +156,10 @@ impl Engine {
         if !key.velocity.data().is_empty() {
             let cells = [key.velocity.width(), key.velocity.height()];
             self.scratch.map.update(key.valid, cells, key.field_offset);
+            if self.config.method == Method::Linear {
+                self.scratch.linear.take_key(&self.pool, &key);
+                self.scratch.linear_key = Some(key.content_time);
+            }
         }
         self.scratch.grid.forget_key();
         let newest = self.newest.replace(key);
@@ -190,7 +198,16 @@ impl Engine {
             Method::Grid => {
                 warp::grid::warp_grid(key, phase, out, &mut self.scratch.grid, &self.pool);
             }
-            Method::Hold | Method::Linear => out.copy_from(&key.color),
+            Method::Linear => {
+                let Scratch { map, linear, linear_key, .. } = &mut self.scratch;
+                // A key that arrived under another method.
+                if *linear_key != Some(key.content_time) {
+                    linear.take_key(&self.pool, key);
+                    *linear_key = Some(key.content_time);
+                }
+                warp::linear::warp_linear(&self.pool, key, map, phase, linear, out);
+            }
+            Method::Hold => out.copy_from(&key.color),
         }
         Some(FrameReport { key_index: key.index, phase, work: (self.config.timer)() - started_at })
     }

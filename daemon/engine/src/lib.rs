@@ -23,6 +23,8 @@ pub mod method;
 pub mod pacing;
 pub mod phase;
 pub mod plane;
+#[cfg(test)]
+mod testing;
 pub mod time;
 pub mod trajectory;
 pub mod warp;

@@ -128,6 +128,16 @@ pub enum DecodeError {
         /// Of the plane's valid rectangle.
         height: u32,
     },
+    /// More cells than a scatter can number.
+    #[error("field of depth and motion: expected at most {max} cells, found {width}x{height}")]
+    FieldSize {
+        /// Most cells.
+        max: u32,
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
     /// A jitter that is not a sub-pixel offset.
     #[error("{plane} plane: expected a jitter within -1 to 1 pixel, found {found:?}")]
     Jitter {

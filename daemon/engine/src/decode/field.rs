@@ -12,6 +12,7 @@ use crate::bands::for_each_row;
 use crate::format::{self, DepthFormat, DepthMeaning, MotionFormat, StreamFormat};
 use crate::key::{Camera, KeyInput};
 use crate::plane::{Plane, Rect};
+use crate::warp::scatter::MAX_CELLS;
 
 /// The depth and motion planes of one key and the grid that they go to.
 pub(super) struct FieldInput<'a> {
@@ -43,6 +44,10 @@ impl<'a> FieldInput<'a> {
             both.iter().flatten().map(|plane| length(&plane.valid)).max().unwrap_or(0)
         };
         let cells = [finest(|valid| valid.width), finest(|valid| valid.height)];
+        let [width, height] = cells;
+        if width * height > MAX_CELLS {
+            return Err(DecodeError::FieldSize { max: MAX_CELLS, width, height });
+        }
         // The jitter of the first plane that has the grid's resolution along the axis.
         let jitter_of = |axis: usize, length: fn(&Rect) -> u32| {
             let plane = both.iter().flatten().find(|plane| length(&plane.valid) == cells[axis]);

@@ -6,7 +6,13 @@
 pub mod blend;
 pub mod gather;
 pub mod grid;
+pub mod linear;
+pub mod resolve;
 pub mod sample;
+pub mod scatter;
+
+#[cfg(test)]
+mod laws;
 
 use crate::key::Velocity;
 use crate::phase::Phase;

@@ -1,0 +1,127 @@
+//! The reference of [`super`].
+
+use rayon::ThreadPool;
+
+use super::NO_CELL;
+use crate::bands::for_each_row;
+use crate::plane::Plane;
+use crate::warp::scatter::{NO_SOURCE, SourceField, source_of};
+
+/// No resolved row on this side.
+const NO_ROW: u16 = u16::MAX;
+
+/// Buffers of the search.
+#[derive(Clone, Debug, Default)]
+pub struct FarScratch {
+    above: Plane<u16>,
+    below: Plane<u16>,
+}
+
+/// Fills `far` with the cell of (3) for each hole of `splat`, and leaves the rest unspecified.
+pub fn far_side(
+    pool: &ThreadPool,
+    source: &SourceField,
+    splat: &Plane<u32>,
+    scratch: &mut FarScratch,
+    far: &mut Plane<u32>,
+) {
+    let (width, height) = (splat.width(), splat.height());
+    far.resize(width, height);
+    let FarScratch { above, below } = scratch;
+    pool.install(|| {
+        rayon::join(|| sweep(splat, 0..height, above), || sweep(splat, (0..height).rev(), below))
+    });
+    for_each_row(pool, far, |y, row| {
+        let splats = splat.row(y);
+        let mut left = None;
+        let mut x = 0;
+        while x < width {
+            if splats[x as usize] != NO_SOURCE {
+                left = Some(x);
+                x += 1;
+                continue;
+            }
+            let run = splats[x as usize..].iter().take_while(|splat| **splat == NO_SOURCE);
+            let end = x + u32::try_from(run.count()).expect("a row has at most 8192 cells");
+            let right = (end < width).then_some(end);
+            for hole in x..end {
+                let side = |cell: u32, way: u32| Side { cell, way };
+                let beside = Sides {
+                    first: left.map(|left| side(y * width + left, hole - left)),
+                    second: right.map(|right| side(y * width + right, right - hole)),
+                };
+                let vertical = |row: u16| {
+                    let row = u32::from(row);
+                    (row != u32::from(NO_ROW)).then(|| side(row * width + hole, row.abs_diff(y)))
+                };
+                let stacked = Sides {
+                    first: vertical(above.at(hole, y)),
+                    second: vertical(below.at(hole, y)),
+                };
+                let sides = if stacked.run() < beside.run() { stacked } else { beside };
+                let depth = |cell: u32| source.depth.data()[source_of(splat.data()[cell as usize])];
+                row[hole as usize] = sides.farther(depth);
+            }
+            x = end;
+        }
+    });
+}
+
+/// For each cell, the last row so far, in the order of `rows`, that is resolved in its column.
+#[expect(clippy::cast_possible_truncation, reason = "a plane has at most 8192 rows")]
+fn sweep(splat: &Plane<u32>, rows: impl Iterator<Item = u32>, nearest: &mut Plane<u16>) {
+    let width = splat.width() as usize;
+    nearest.resize(splat.width(), splat.height());
+    let mut before = None;
+    for y in rows {
+        let start = y as usize * width;
+        if let Some(before) = before {
+            nearest.data_mut().copy_within(before..before + width, start);
+        } else {
+            nearest.row_mut(y).fill(NO_ROW);
+        }
+        for (row, &splat) in nearest.row_mut(y).iter_mut().zip(splat.row(y)) {
+            *row = if splat == NO_SOURCE { *row } else { y as u16 };
+        }
+        before = Some(start);
+    }
+}
+
+/// A resolved cell and how far it is from the hole.
+#[derive(Clone, Copy)]
+struct Side {
+    cell: u32,
+    way: u32,
+}
+
+/// The resolved cells on both sides of a hole along one axis.
+struct Sides {
+    first: Option<Side>,
+    second: Option<Side>,
+}
+
+impl Sides {
+    /// (1).
+    fn run(&self) -> u32 {
+        match (&self.first, &self.second) {
+            (Some(first), Some(second)) => first.way + second.way,
+            (Some(only), None) | (None, Some(only)) => 2 * only.way,
+            (None, None) => u32::MAX,
+        }
+    }
+
+    /// (3).
+    fn farther(&self, depth: impl Fn(u32) -> u32) -> u32 {
+        let (Some(first), Some(second)) = (self.first, self.second) else {
+            return self.first.or(self.second).map_or(NO_CELL, |side| side.cell);
+        };
+        let (a, b) = (depth(first.cell), depth(second.cell));
+        if a < b - (b >> 8) {
+            first.cell
+        } else if b < a - (a >> 8) || second.way < first.way {
+            second.cell
+        } else {
+            first.cell
+        }
+    }
+}

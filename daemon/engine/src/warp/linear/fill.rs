@@ -1,0 +1,91 @@
+//! What a hole shows: (3) and (4) of [`super`].
+
+use super::cpu::Frame;
+use crate::color::Texel;
+use crate::fill::far_side::NO_CELL;
+use crate::plane::Plane;
+use crate::warp::displacement;
+use crate::warp::sample::sample;
+use crate::warp::scatter::{NO_SOURCE, source_of};
+
+/// The colour of pixel centre `p` of the hole at `cell` of the field grid.
+pub(super) fn hole_pixel<T: Texel>(
+    frame: &Frame<'_>,
+    color: &Plane<T>,
+    cell: [u32; 2],
+    p: [i32; 2],
+) -> T {
+    let splat = &frame.field.splat;
+    let Some(far) = far_cell(frame, cell) else {
+        return sample(color, frame.valid, p[0], p[1]);
+    };
+    let source = source_of(splat.data()[far as usize]);
+    let depth = frame.field.source.depth.data()[source];
+    let [dx, dy] = displacement(frame.field.source.velocity.data()[source], frame.phase);
+    // (3)
+    let q = clamp(frame, [p[0] - dx, p[1] - dy]);
+    if is_far(frame, q, depth) {
+        return read(frame, color, q, depth);
+    }
+    // (4)
+    let (width, map) = (splat.width(), frame.map);
+    let within = |p: i32, centre: i32, cell_px: i32| p.clamp(centre - cell_px, centre + cell_px);
+    let half = frame.one_cell >> 1;
+    let edge = [
+        within(p[0], map.x.centre(far % width), half),
+        within(p[1], map.y.centre(far / width), half),
+    ];
+    let q = clamp(frame, [edge[0] - dx, edge[1] - dy]);
+    if is_far(frame, q, depth) {
+        return read(frame, color, q, depth);
+    }
+    let source = u32::try_from(source).expect("a source has 25 bits");
+    let q = [map.x.centre(source % width), map.y.centre(source / width)];
+    let [x, y] = clamp(frame, q).map(|q| (q + 128) & !0xff);
+    sample(color, frame.valid, x, y)
+}
+
+/// The cell that a hole pixel continues: the far side of its own cell if that is a hole, else the
+/// farthest surface in 3x3 around it, the first in reading order among equals.
+fn far_cell(frame: &Frame<'_>, [cell_x, cell_y]: [u32; 2]) -> Option<u32> {
+    let splat = &frame.field.splat;
+    let (width, height) = (splat.width(), splat.height());
+    let resolved = |x: u32, y: u32| {
+        let cell = y * width + x;
+        let far = if splat.at(x, y) == NO_SOURCE { frame.field.far.at(x, y) } else { cell };
+        (far != NO_CELL).then_some(far)
+    };
+    if splat.at(cell_x, cell_y) == NO_SOURCE {
+        return resolved(cell_x, cell_y);
+    }
+    let rows = cell_y.saturating_sub(1)..=(cell_y + 1).min(height - 1);
+    let columns = cell_x.saturating_sub(1)..=(cell_x + 1).min(width - 1);
+    let cells = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
+    cells
+        .filter_map(|(x, y)| resolved(x, y))
+        .min_by_key(|cell| frame.field.source.depth.data()[source_of(splat.data()[*cell as usize])])
+}
+
+/// Clamps to the pixel centres of the valid rectangle.
+fn clamp(frame: &Frame<'_>, q: [i32; 2]) -> [i32; 2] {
+    let valid = frame.valid;
+    let bound = |q: i32, start: u32, length: u32| {
+        q.clamp((start << 8).cast_signed(), ((start + length - 1) << 8).cast_signed())
+    };
+    [bound(q[0], valid.x, valid.width), bound(q[1], valid.y, valid.height)]
+}
+
+/// Whether the key shows at the pixel nearest to `q` nothing nearer than `depth`.
+fn is_far(frame: &Frame<'_>, q: [i32; 2], depth: u32) -> bool {
+    frame.surface_at(q).is_some_and(|near| near.depth - (near.depth >> 8) <= depth)
+}
+
+/// The key at `q`, between pixels only where all of them are far, else at the nearest one, which
+/// is.
+fn read<T: Texel>(frame: &Frame<'_>, color: &Plane<T>, q: [i32; 2], depth: u32) -> T {
+    let [x, y] = q.map(|q| q & !0xff);
+    let corners = [[x, y], [x + 256, y], [x, y + 256], [x + 256, y + 256]];
+    let mixes_near = corners.into_iter().any(|corner| !is_far(frame, clamp(frame, corner), depth));
+    let [x, y] = if mixes_near { q.map(|q| (q + 128) & !0xff) } else { q };
+    sample(color, frame.valid, x, y)
+}

@@ -1,0 +1,32 @@
+//! The linear method: the motion field scaled by the phase, forward.
+//!
+//! Scatter ([`super::scatter`]) and resolve ([`super::resolve`]) tell for each cell of the field
+//! grid which surface comes there; this kernel reads the colour at full resolution. With `p` an
+//! output pixel, `d(v)` the displacement of a velocity, and `near(q)` the surface that the key
+//! shows at pixel q (the dilated one, so that outlines belong to what they outline):
+//!
+//! ```text
+//! (1) smooth cell:  out(p) = key(p - d), d interpolated between the four cells around p
+//! (2) broken cell:  for each cell n of 3x3 around p: q = p - d(v_n), e = |d(near(q)) - d(v_n)|
+//!                   out(p) = key(q) of the nearest near(q) with e <= one cell, of the smallest e
+//!                   where depths are within 1/256 of each other
+//! (3) no such n:    a hole. f = the far side. q = p - d(v_f), clamped to the valid rectangle
+//!                   out(p) = key(q) where near(q) is not nearer than f
+//! (4) else          out(p) = key's pixel where the pixel of f closest to p came from
+//! ```
+//!
+//! (2) asks the key itself whether the surface of a candidate is what p would show: a field
+//! coarser than colour, the 2x2 footprint and dilation all reach farther than surfaces do. (3)
+//! continues the far surface under what used to hide it; where it is still hidden in the key, (4)
+//! stretches its last visible pixel. Neither reads between two pixels unless both are far, so a
+//! hole never shows the nearer surface.
+//!
+//! Edges: reads are clamped to the valid rectangle; what comes in over the border is a hole.
+//! Phase 0 gives the key. Exactness: `Exact`.
+
+mod cpu;
+mod fill;
+mod scratch;
+
+pub use cpu::warp_linear;
+pub use scratch::LinearScratch;

@@ -1,0 +1,149 @@
+//! The reference of [`super`].
+
+use rayon::ThreadPool;
+
+use super::{NO_SOURCE, SOURCE_BITS};
+use crate::bands::for_each_band;
+use crate::field::{FieldAxis, FieldMap};
+use crate::key::{KeyFrame, Velocity};
+use crate::phase::Phase;
+use crate::plane::Plane;
+use crate::trajectory::dilate_motion::nearest_in_3x3;
+
+/// Rows of a band. Few enough for its planes to stay in a core's cache, many enough that
+/// few source rows are visited by two bands.
+const BAND_ROWS: usize = 64;
+
+/// What the scatter reads of a key; derived from it once.
+#[derive(Clone, Debug, Default)]
+pub struct SourceField {
+    /// Velocity per cell, 0 where none is known.
+    pub velocity: Plane<Velocity>,
+    /// Depth key of the surface that the velocity is of.
+    pub depth: Plane<u32>,
+    /// Smallest and largest downward velocity of each row.
+    reach: Vec<[i16; 2]>,
+}
+
+impl SourceField {
+    /// Takes the field of `key`, which has a velocity field.
+    ///
+    /// Without depth, a faster surface counts as nearer, in steps of a pixel: it is what parallax
+    /// does to a moving camera, and better than a fold-over that shows both surfaces at random.
+    pub fn update(&mut self, pool: &ThreadPool, key: &KeyFrame) {
+        let (width, height) = (key.velocity.width(), key.velocity.height());
+        self.velocity.resize(width, height);
+        self.depth.resize(width, height);
+        let has_depth = !key.depth.data().is_empty();
+        crate::bands::for_each_row(pool, &mut self.velocity, |y, row| {
+            for (held, &velocity) in row.iter_mut().zip(key.velocity.row(y)) {
+                *held = if velocity.is_trackable() { velocity } else { Velocity::default() };
+            }
+        });
+        let velocity = &self.velocity;
+        crate::bands::for_each_row(pool, &mut self.depth, |y, row| {
+            for (x, depth) in (0..).zip(row) {
+                *depth = if has_depth {
+                    nearest_in_3x3(&key.depth, x, y).1
+                } else {
+                    let Velocity { x: vx, y: vy } = velocity.at(x, y);
+                    (u32::from(vx.unsigned_abs()) + u32::from(vy.unsigned_abs())) >> 5
+                };
+            }
+        });
+        self.reach.clear();
+        self.reach.extend((0..height).map(|y| {
+            let rows = self.velocity.row(y).iter().map(|velocity| velocity.y);
+            rows.fold([i16::MAX, i16::MIN], |[min, max], vy| [min.min(vy), max.max(vy)])
+        }));
+    }
+}
+
+/// `p_cell` of (1): the phase in the unit that turns velocities into Q8 cells.
+#[expect(clippy::cast_possible_wrap, reason = "at most the phase, 16384")]
+fn phase_in_cells(phase: Phase, axis: &FieldAxis) -> i32 {
+    let pixels = axis.pixels();
+    ((phase.q12().cast_unsigned() * axis.cells() + pixels / 2) / pixels) as i32
+}
+
+/// Splats `source` into `splat`; `top` keeps the depth keys of (2).
+pub fn scatter(
+    pool: &ThreadPool,
+    source: &SourceField,
+    map: &FieldMap,
+    phase: Phase,
+    top: &mut Plane<u32>,
+    splat: &mut Plane<u32>,
+) {
+    let (width, height) = (source.velocity.width(), source.velocity.height());
+    top.resize(width, height);
+    splat.resize(width, height);
+    let scale = [phase_in_cells(phase, &map.x), phase_in_cells(phase, &map.y)];
+    let band_rows = BAND_ROWS.min((height as usize).div_ceil(pool.current_num_threads()));
+    for_each_band(pool, top, splat, band_rows, |first_row, top, splat| {
+        top.fill(0);
+        splat.fill(NO_SOURCE);
+        let mut band = Band { source, scale, first_row, top, splat };
+        band.visit(|top, _, depth, _| *top = (*top).max(depth));
+        band.visit(|top, splat, depth, candidate| {
+            if depth >= *top - (*top >> 8) {
+                *splat = (*splat).min(candidate);
+            }
+        });
+    });
+}
+
+/// A run of target rows and what lands on it.
+struct Band<'a> {
+    source: &'a SourceField,
+    scale: [i32; 2],
+    first_row: u32,
+    top: &'a mut [u32],
+    splat: &'a mut [u32],
+}
+
+impl Band<'_> {
+    /// Calls `cell(top, splat, depth key, candidate of (3))` for each splat on the band.
+    fn visit(&mut self, cell: impl Fn(&mut u32, &mut u32, u32, u32)) {
+        let width = self.source.velocity.width() as usize;
+        let rows = (self.top.len() / width).cast_signed();
+        let first_row = self.first_row as isize;
+        let [scale_x, scale_y] = self.scale;
+        for (y, &[slowest, fastest]) in (0_u32..).zip(&self.source.reach) {
+            let land = |v: i16| ((y << 8).cast_signed() + shift(v, scale_y)) >> 8;
+            let (from, to) =
+                (land(slowest) as isize - first_row, land(fastest) as isize + 1 - first_row);
+            if to < 0 || from >= rows {
+                continue;
+            }
+            let velocities = self.source.velocity.row(y);
+            let depths = self.source.depth.row(y);
+            for (x, (velocity, &depth)) in (0_u32..).zip(velocities.iter().zip(depths)) {
+                let target_x = (x << 8).cast_signed() + shift(velocity.x, scale_x);
+                let target_y = (y << 8).cast_signed() + shift(velocity.y, scale_y);
+                let (left, fx) = (target_x >> 8, (target_x & 0xff).cast_unsigned());
+                let (above, fy) = (target_y >> 8, (target_y & 0xff).cast_unsigned());
+                let index = y * width as u32 + x;
+                for (row, way_y) in [(above, fy), (above + 1, 256 - fy)] {
+                    let row = row as isize - first_row;
+                    if way_y == 256 || row < 0 || row >= rows {
+                        continue;
+                    }
+                    for (column, way_x) in [(left, fx), (left + 1, 256 - fx)] {
+                        if way_x == 256 || column < 0 || column >= width as i32 {
+                            continue;
+                        }
+                        let place = row.cast_unsigned() * width + column as usize;
+                        let candidate = (((way_x + way_y) >> 2) << SOURCE_BITS) | index;
+                        cell(&mut self.top[place], &mut self.splat[place], depth, candidate);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Displacement in Q8 cells of (1).
+fn shift(v: i16, scale: i32) -> i32 {
+    (i32::from(v) * scale + 256) >> 9
+}
