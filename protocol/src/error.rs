@@ -62,6 +62,16 @@ pub enum Error {
         /// State that it is in.
         found: String,
     },
+    /// A key frame that is not newer than the one before it.
+    #[error("submit, field {field}: expected more than {last}, found {found}")]
+    Order {
+        /// The field.
+        field: &'static str,
+        /// Of the key frame before.
+        last: u64,
+        /// Of this one.
+        found: u64,
+    },
     /// Shared memory that would not be safe to read.
     #[error("shared memory, {property}: expected {expected}, found {found}")]
     Memory {
@@ -161,6 +171,9 @@ impl Error {
             }
             Self::Slot { slot, expected, found } => {
                 (format!("slot {slot}"), (*expected).into(), found.clone())
+            }
+            Self::Order { field, last, found } => {
+                ((*field).into(), format!("more than {last}"), found.to_string())
             }
             Self::Memory { property, expected, found } => {
                 ((*property).into(), expected.clone(), found.clone())

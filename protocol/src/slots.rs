@@ -1,4 +1,5 @@
-//! Who may touch a slot when: the state machine of `PROTOCOL.md`, the same code on either side.
+//! Who may touch a slot when, and which key frame may follow which: the state machine of
+//! `PROTOCOL.md` as the daemon keeps it. A client only has to know which slots are its own.
 //!
 //! ```text
 //! client --submit--> submitted --latch--> latched --release--> client
@@ -10,7 +11,7 @@
 
 use crate::error::{Error, Result};
 use crate::limits::MAX_SLOTS;
-use crate::wire::submit::ReleaseReason;
+use crate::wire::submit::Submit;
 
 /// Where a slot is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -117,31 +118,38 @@ impl SlotTable {
         Some(latched)
     }
 
-    /// The client learns that a slot is its own again.
-    ///
-    /// # Errors
-    /// [`Error::Slot`] if the daemon did not have it, or had another key frame in it.
-    pub fn on_released(&mut self, slot: u32, key_index: u64, reason: ReleaseReason) -> Result<()> {
-        let fail = |found: String| {
-            Err(Error::Slot { slot, expected: "a slot that the daemon has", found })
-        };
-        let Some(state) = self.states.get_mut(slot as usize) else {
-            return fail(format!("{} slots in the pool", self.states.len()));
-        };
-        match *state {
-            SlotState::Submitted { key_index: found } | SlotState::Latched { key_index: found }
-                if found == key_index =>
-            {
-                *state = SlotState::Client;
-                Ok(())
-            }
-            other => fail(format!("{other:?}, released as key {key_index} ({reason})")),
-        }
-    }
-
     fn find(&self, key_of: impl Fn(SlotState) -> Option<u64>) -> Option<SlotUse> {
         (0..)
             .zip(&self.states)
             .find_map(|(slot, &state)| key_of(state).map(|key_index| SlotUse { slot, key_index }))
+    }
+}
+
+/// Holds that indices and content times of a stream's key frames only increase.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct KeyOrder {
+    last: Option<(u64, u64)>,
+}
+
+impl KeyOrder {
+    /// Takes note of the next key frame.
+    ///
+    /// # Errors
+    /// [`Error::Order`] if its index or its content time is not above the last one's. Nothing
+    /// changes then.
+    pub fn advance(&mut self, submit: &Submit) -> Result<()> {
+        if let Some((key_index, content_time_ns)) = self.last {
+            let pairs = [
+                ("key_index", key_index, submit.key_index),
+                ("content_time_ns", content_time_ns, submit.content_time_ns),
+            ];
+            for (field, last, found) in pairs {
+                if found <= last {
+                    return Err(Error::Order { field, last, found });
+                }
+            }
+        }
+        self.last = Some((submit.key_index, submit.content_time_ns));
+        Ok(())
     }
 }

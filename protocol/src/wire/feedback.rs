@@ -328,6 +328,7 @@ impl ErrorMessage {
             }
             Error::Plane { .. } => ErrorCode::Plane,
             Error::Slot { .. } => ErrorCode::State,
+            Error::Order { .. } => ErrorCode::Order,
             Error::Memory { .. } => ErrorCode::Memory,
             _ => ErrorCode::Internal,
         };
