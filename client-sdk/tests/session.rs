@@ -185,7 +185,7 @@ fn a_rejected_client_learns_both_versions() {
 #[test]
 fn a_daemon_that_never_answers_is_given_up() {
     let folder = tempfile::tempdir().unwrap();
-    let listener = Listener::bind(&folder.path().join("daemon.sock")).unwrap();
+    let listener = Listener::bind(&folder.path().join("private").join("daemon.sock")).unwrap();
     let options = ConnectOptions::new("test").socket(listener.path());
     let refused = options.connect(Duration::from_millis(1));
     assert!(matches!(refused, Err(Error::Timeout { .. })), "{refused:?}");
