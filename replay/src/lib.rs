@@ -6,6 +6,8 @@
 
 pub mod cli;
 pub mod commands;
+pub mod draw;
 pub mod output;
+pub mod pictures;
 pub mod recording;
 pub mod score;
