@@ -7,6 +7,7 @@
 pub mod cli;
 pub mod commands;
 pub mod draw;
+pub mod exr_frames;
 pub mod output;
 pub mod pictures;
 pub mod recording;
