@@ -72,9 +72,9 @@ impl SinkWorker {
         }
     }
 
-    /// A refresh showed the last frame again.
-    pub fn repeat(&mut self) {
-        self.repeats += 1;
+    /// That many refreshes showed the last frame again.
+    pub fn repeat(&mut self, refreshes: u64) {
+        self.repeats += refreshes;
     }
 
     /// Frames that did not reach the file: the queue was full, or the write failed.
@@ -189,8 +189,7 @@ mod tests {
             open.send(()).unwrap();
         }
         worker.offer(0, &mut ColorPlane::new(ColorFormat::Rgba8, 2, 2));
-        worker.repeat();
-        worker.repeat();
+        worker.repeat(2);
         worker.offer(3, &mut ColorPlane::new(ColorFormat::Rgba8, 2, 2));
         drop(worker);
         assert_eq!(count_frames(&writes), 4);

@@ -1,15 +1,18 @@
-//! `foreframe serve`.
+//! `foreframe serve`: the daemon itself, so that one binary is enough.
 
 use crate::output::Output;
 
 /// Arguments of `foreframe serve`.
 #[derive(clap::Args, Debug)]
-pub struct Args {}
+pub struct Args {
+    #[command(flatten)]
+    daemon: foreframed::Args,
+}
 
-/// Runs the command.
+/// Serves clients until a signal ends it.
 ///
 /// # Errors
-/// Always, until it exists.
-pub fn run(_args: Args, _output: &Output) -> anyhow::Result<()> {
-    anyhow::bail!("serve does not exist yet")
+/// If the daemon cannot start.
+pub fn run(args: Args, _output: &Output) -> anyhow::Result<()> {
+    foreframed::run(args.daemon)
 }

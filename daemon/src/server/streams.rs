@@ -1,0 +1,202 @@
+//! Streams: start, the events of their threads, end.
+
+use std::sync::Arc;
+use std::thread::JoinHandle;
+
+use anyhow::Context as _;
+use foreframe_engine::EngineConfig;
+use foreframe_protocol::memory::ReadOnlyPool;
+use foreframe_protocol::{
+    CreateStream, EndReason, ErrorCode, OutputFrame, Pacing, Presented, ReleaseReason,
+    SlotReleased, Statistics, StreamEnded, StreamFormat,
+};
+use tracing::{debug, error, info};
+
+use super::Server;
+use crate::clock::{self, Waker};
+use crate::ingest::{self, KeyOrder};
+use crate::session::fault::Fault;
+use crate::sink::Sink;
+use crate::sink::worker::SinkWorker;
+use crate::stream::core::CoreConfig;
+use crate::stream::mailbox::Mailbox;
+use crate::stream::reaper::Reaped;
+use crate::stream::thread::{self, StreamParts};
+use crate::stream::{FromStream, StreamEvent};
+
+/// A stream whose thread runs.
+#[derive(Debug)]
+pub(super) struct Stream {
+    /// Session of its client.
+    pub(super) session: u32,
+    /// What the client declared, with its own number of the stream.
+    pub(super) create: CreateStream,
+    pub(super) mailbox: Arc<Mailbox>,
+    pub(super) order: KeyOrder,
+    pub(super) pool: Option<Pool>,
+    /// Bytes that it costs its client, pool included.
+    pub(super) cost: u64,
+    /// There once it has been told to end.
+    end: Option<EndReason>,
+    thread: Option<JoinHandle<()>>,
+}
+
+/// The memory of a stream's key frames.
+#[derive(Debug)]
+pub(super) struct Pool {
+    pub(super) memory: Arc<Reaped<ReadOnlyPool>>,
+    pub(super) slot_bytes: u64,
+}
+
+impl Stream {
+    /// Tells the thread to end. The first reason stays.
+    pub(super) fn close(&mut self, reason: EndReason) {
+        if self.end.is_none() {
+            self.end = Some(reason);
+            self.mailbox.close();
+        }
+        self.pool = None;
+    }
+
+    pub(super) fn is_closed(&self) -> bool {
+        self.end.is_some()
+    }
+}
+
+/// Bytes of private memory that a stream may take: eight pictures (two keys, a copy, the one being
+/// made, four on the way to a sink) and 48 bytes a pixel of depth, motion and what the warp needs.
+pub(super) fn stream_cost(format: &StreamFormat) -> u64 {
+    let pixels = u64::from(format.width) * u64::from(format.height);
+    pixels * (8 * u64::from(format.color.bytes_per_pixel()) + 48)
+}
+
+impl Server {
+    /// Starts the thread of a stream. Gives its number in this process.
+    pub(super) fn start_stream(
+        &mut self,
+        session: u32,
+        create: &CreateStream,
+        cost: u64,
+    ) -> anyhow::Result<u64> {
+        let ordinal = self.next_ordinal;
+        let config = &self.config;
+        let format = ingest::stream_format(&create.format);
+        let sink = Sink::open(&config.sink, &format, config.refresh_interval, ordinal)
+            .with_context(|| format!("opening the sink {}", config.sink))?;
+        let sink = match sink.keeps_frames() {
+            true => Some(SinkWorker::spawn(sink).context("starting the sink's thread")?),
+            false => None,
+        };
+        let waker = Waker::new().context("making a waker")?;
+        let mailbox = Arc::new(Mailbox::new(create.slots, waker));
+        let number_in_file = u32::try_from(ordinal + 1).context("numbering the stream")?;
+        let thread = thread::start(StreamParts {
+            ordinal,
+            create: *create,
+            core: CoreConfig {
+                engine: EngineConfig {
+                    method: config.method,
+                    threads: config.threads,
+                    pixels_per_degree: config.pixels_per_degree,
+                    timer: clock::now,
+                },
+                refresh_interval: config.refresh_interval,
+                display_origin: self.display_origin,
+            },
+            mailbox: Arc::clone(&mailbox),
+            events: self.events.clone(),
+            sink,
+            recorder: self.recorder.as_ref().and_then(|it| it.stream(number_in_file)),
+        })
+        .context("starting the stream's thread")?;
+        self.next_ordinal += 1;
+        let (width, height) = (create.format.width, create.format.height);
+        info!(session, stream = create.stream, width, height, "stream started");
+        self.streams.insert(
+            ordinal,
+            Stream {
+                session,
+                create: *create,
+                mailbox,
+                order: KeyOrder::default(),
+                pool: None,
+                cost,
+                end: None,
+                thread: Some(thread),
+            },
+        );
+        Ok(ordinal)
+    }
+
+    /// Passes on what a stream's thread tells.
+    pub(super) fn on_stream_event(&mut self, FromStream { ordinal, event }: FromStream) {
+        let Some(stream) = self.streams.get(&ordinal) else { return };
+        let (session, number) = (stream.session, stream.create.stream);
+        match event {
+            StreamEvent::SlotCopied(slot) => self.send(
+                session,
+                SlotReleased {
+                    stream: number,
+                    slot: slot.slot,
+                    key_index: slot.key_index,
+                    reason: ReleaseReason::Copied,
+                },
+            ),
+            StreamEvent::KeyRefused(message) => {
+                self.fail(session, Fault::from(message).of_stream(number));
+            }
+            StreamEvent::Presented(presented) => {
+                self.offer(session, Presented { stream: number, ..presented });
+            }
+            StreamEvent::Statistics(statistics) => {
+                debug!(session, ?statistics, "statistics");
+                self.offer(session, Statistics { stream: number, ..statistics });
+            }
+            StreamEvent::Pacing(pacing) => {
+                self.offer(session, Pacing { stream: number, ..pacing });
+            }
+            StreamEvent::Output(subscriber, frame) => self.on_output(ordinal, subscriber, frame),
+            StreamEvent::Ended { has_panicked } => self.on_stream_ended(ordinal, has_panicked),
+        }
+    }
+
+    fn on_output(&mut self, ordinal: u64, subscriber: u32, frame: OutputFrame) {
+        if self.offer(subscriber, frame) {
+            return;
+        }
+        // The subscriber will not hear of this frame, so it cannot give the slot back either.
+        let Some(session) = self.sessions.get(&subscriber) else { return };
+        let outlets = session.subscriptions.iter().filter_map(|it| it.outlet.as_ref());
+        for (followed, outlet) in outlets {
+            if *followed == ordinal && outlet.pool == frame.pool {
+                outlet.take_back(frame.slot);
+            }
+        }
+    }
+
+    fn on_stream_ended(&mut self, ordinal: u64, has_panicked: bool) {
+        let Some(mut stream) = self.streams.remove(&ordinal) else { return };
+        if let Some(thread) = stream.thread.take()
+            && thread.join().is_err()
+        {
+            error!(stream = ordinal, "the stream's thread panicked");
+        }
+        let number = stream.create.stream;
+        let reason =
+            if has_panicked { EndReason::Error } else { stream.end.unwrap_or(EndReason::Error) };
+        info!(session = stream.session, stream = number, %reason, "stream ended");
+        if let Some(session) = self.sessions.get_mut(&stream.session) {
+            session.streams.remove(&number);
+            session.cost = session.cost.saturating_sub(stream.cost);
+        }
+        if stream.end.is_none() {
+            let fault =
+                Fault::fatal(ErrorCode::Internal, "stream", "a stream that goes on", "its end");
+            self.fail(stream.session, fault.tolerated().of_stream(number));
+        }
+        self.send(stream.session, StreamEnded { stream: number, reason });
+        self.on_source_ended(ordinal, stream.session, number, reason);
+        self.follow_shown_stream();
+        self.finish_stop_if_idle();
+    }
+}

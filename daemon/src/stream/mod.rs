@@ -1,0 +1,47 @@
+//! Streams: one thread each, from key frames in shared memory to pictures at the display's pace.
+//!
+//! The main loop [`start`](thread::start)s a stream, puts checked submissions into its [`mailbox`],
+//! and hears of everything else through [`StreamEvent`]s. The [`thread`] copies planes out of the
+//! pool ([`planes`]), drives the [`core`], and hands pictures to subscribers ([`outlet`]), to a sink
+//! and key frames to the recorder. Whatever is slow to drop goes to the [`reaper`].
+
+pub mod core;
+pub mod mailbox;
+pub mod outlet;
+pub mod planes;
+pub mod reaper;
+pub mod thread;
+
+use foreframe_protocol::slots::SlotUse;
+use foreframe_protocol::{ErrorMessage, OutputFrame, Pacing, Presented, Statistics};
+
+/// What a stream's thread tells the main loop, in order.
+#[derive(Clone, PartialEq, Debug)]
+pub enum StreamEvent {
+    /// The planes of a key frame are copied.
+    SlotCopied(SlotUse),
+    /// A key frame does not fit its stream. The message has everything but the stream's number.
+    KeyRefused(ErrorMessage),
+    /// A key frame came to the display. Lacks the stream's number.
+    Presented(Presented),
+    /// Counts. Lacks the stream's number.
+    Statistics(Statistics),
+    /// How a key frame met the display. Lacks the stream's number.
+    Pacing(Pacing),
+    /// A frame lies in a slot of an output pool of this session.
+    Output(u32, OutputFrame),
+    /// The thread has ended, and this is its last event.
+    Ended {
+        /// Because of a bug in it.
+        has_panicked: bool,
+    },
+}
+
+/// An event and the stream that it comes from, by its number in this process.
+#[derive(Clone, PartialEq, Debug)]
+pub struct FromStream {
+    /// The stream.
+    pub ordinal: u64,
+    /// The event.
+    pub event: StreamEvent,
+}

@@ -1,0 +1,328 @@
+//! The thread of a stream: waits for keys and for the pacer's wakes, and carries things to and fro.
+//!
+//! A turn takes at most one key and makes at most one picture, so that neither a flood of keys nor
+//! slow pictures starve the other. Nothing here waits for anybody: sinks, recorder, subscribers and
+//! main loop are all behind queues or slots that can be full.
+
+use std::io;
+use std::sync::Arc;
+use std::thread::{self, JoinHandle};
+
+use calloop::channel::Sender;
+use foreframe_engine::pacing::Plan;
+use foreframe_engine::{MonoSpan, MonoTime};
+use foreframe_protocol::{
+    CreateStream, ErrorCode, ErrorMessage, OutputFrame, OutputKind, Pacing, Presented, Statistics,
+};
+use tracing::{debug, error, info, trace, warn};
+
+use super::core::{CoreConfig, FrameKind, FrameOutcome, PresentedFrame, StreamCore};
+use super::mailbox::{Mailbox, Submission, Taken};
+use super::planes::PlaneCopier;
+use super::{FromStream, StreamEvent};
+use crate::clock::{self, Alarm, Woken};
+use crate::ingest;
+use crate::recorder::StreamRecorder;
+use crate::sink::worker::SinkWorker;
+
+/// Refreshes in a row with nothing new to show, after which the thread waits for the next key
+/// alone. Easing ends well before.
+const REPEATS_BEFORE_IDLE: u32 = 120;
+/// Time between two reports of counts.
+const STATISTICS_INTERVAL: MonoSpan = MonoSpan::from_ms(250);
+/// Real-time priority, at the lower end: above every ordinary thread, below what drives devices.
+const REAL_TIME_PRIORITY: u8 = 10;
+
+/// Everything a stream's thread owns from the start.
+#[derive(Debug)]
+pub struct StreamParts {
+    /// Number of the stream in this process.
+    pub ordinal: u64,
+    /// What the client declared.
+    pub create: CreateStream,
+    /// How engine and display work.
+    pub core: CoreConfig,
+    /// Where keys come from.
+    pub mailbox: Arc<Mailbox>,
+    /// Where events go.
+    pub events: Sender<FromStream>,
+    /// A sink that keeps frames, if there is one.
+    pub sink: Option<SinkWorker>,
+    /// Takes keys, if the daemon records.
+    pub recorder: Option<StreamRecorder>,
+}
+
+/// Starts the thread.
+///
+/// # Errors
+/// If the process has no descriptor or thread left.
+pub fn start(parts: StreamParts) -> io::Result<JoinHandle<()>> {
+    let alarm = Alarm::new()?;
+    let name = format!("foreframe-{}", parts.ordinal);
+    thread::Builder::new().name(name).spawn(move || {
+        // Declared first, so dropped last: when this is told, everything else is gone.
+        let _last_words = LastWords { ordinal: parts.ordinal, events: parts.events.clone() };
+        StreamThread::new(parts).run(&alarm);
+    })
+}
+
+/// Tells the main loop that the thread has ended, however it ended.
+struct LastWords {
+    ordinal: u64,
+    events: Sender<FromStream>,
+}
+
+impl Drop for LastWords {
+    fn drop(&mut self) {
+        let event = StreamEvent::Ended { has_panicked: thread::panicking() };
+        // Without a main loop nobody needs to know.
+        drop(self.events.send(FromStream { ordinal: self.ordinal, event }));
+    }
+}
+
+struct StreamThread {
+    parts: StreamParts,
+    core: StreamCore,
+    copier: PlaneCopier,
+    /// The newest key, until the first picture made from it is shown.
+    unshown: Option<Unshown>,
+    refused: u64,
+    repeats_in_a_row: u32,
+    synthesis: Mean,
+    statistics_due_at: MonoTime,
+}
+
+struct Unshown {
+    key_index: u64,
+    received_at_ns: u64,
+}
+
+/// Mean of what was added.
+#[derive(Default)]
+struct Mean {
+    sum_ns: u64,
+    count: u64,
+}
+
+impl StreamThread {
+    fn new(parts: StreamParts) -> Self {
+        let format = ingest::stream_format(&parts.create.format);
+        // Before real-time priority is asked for: the engine's workers must not inherit it.
+        let core = StreamCore::new(format, &parts.core);
+        Self {
+            parts,
+            core,
+            copier: PlaneCopier::default(),
+            unshown: None,
+            refused: 0,
+            repeats_in_a_row: 0,
+            synthesis: Mean::default(),
+            statistics_due_at: clock::now(),
+        }
+    }
+
+    fn run(mut self, alarm: &Alarm) {
+        if let Some(recorder) = &self.parts.recorder {
+            recorder.announce(&self.parts.create);
+        }
+        ask_for_real_time();
+        let mailbox = Arc::clone(&self.parts.mailbox);
+        loop {
+            match mailbox.take() {
+                Taken::Closed => break,
+                Taken::Key(submission) => self.take_key(&submission),
+                Taken::Nothing => {}
+            }
+            let plan = self.core.plan(clock::now());
+            let is_idle =
+                plan.content_time.is_none() || self.repeats_in_a_row >= REPEATS_BEFORE_IDLE;
+            let wake_at = if is_idle { MonoTime::FAR_FUTURE } else { plan.wake_at };
+            match alarm.wait(&mailbox.waker, wake_at) {
+                Ok(Woken::ByWaker) => {}
+                Ok(Woken::AtDeadline) => self.make_frame(&plan),
+                Err(error) => {
+                    error!(%error, "a stream cannot wait and ends");
+                    break;
+                }
+            }
+        }
+        self.send_statistics();
+    }
+
+    fn take_key(&mut self, submission: &Submission) {
+        let Submission { submit, arrived_at, pool, slot_offset } = submission;
+        let format = &self.parts.create.format;
+        let copied = self.copier.copy(format, submit, pool, *slot_offset);
+        if let Some(slot) = self.parts.mailbox.release() {
+            self.send(StreamEvent::SlotCopied(slot));
+        }
+        let planes = match copied {
+            Ok(planes) => planes,
+            Err(error) => return self.refuse(ErrorMessage::new(&error, false, None)),
+        };
+        if let Some(recorder) = &mut self.parts.recorder {
+            recorder.offer(submit, *arrived_at, &planes);
+        }
+        let input = match ingest::key_input(format, submit, |kind| planes.get(kind)) {
+            Ok(input) => input,
+            Err(error) => return self.refuse(plane_error(error.parts())),
+        };
+        match self.core.on_key(&input, *arrived_at) {
+            Ok(report) => trace!(key = submit.key_index, work = %report.work, "key taken in"),
+            Err(error) => {
+                let parts = ("planes".to_owned(), "what the stream declares".to_owned());
+                return self.refuse(plane_error((parts.0, parts.1, error.to_string())));
+            }
+        }
+        self.repeats_in_a_row = 0;
+        self.unshown =
+            Some(Unshown { key_index: submit.key_index, received_at_ns: arrived_at.as_ns() });
+        self.send_pacing(submit.key_index);
+    }
+
+    fn refuse(&mut self, message: ErrorMessage) {
+        debug!(expected = message.expected, found = message.found, "key refused");
+        self.refused += 1;
+        self.send(StreamEvent::KeyRefused(message));
+    }
+
+    fn make_frame(&mut self, plan: &Plan) {
+        let Some(outcome) = self.core.make(plan, clock::now) else { return };
+        match outcome {
+            FrameOutcome::Repeated => self.repeats_in_a_row += 1,
+            FrameOutcome::Dropped => debug!(present_at = ?plan.present_at, "frame not ready"),
+            FrameOutcome::Presented(frame) => {
+                trace!(?frame, "frame presented");
+                self.repeats_in_a_row = 0;
+                self.deliver(&frame);
+            }
+        }
+        if self.statistics_due_at <= plan.present_at {
+            self.statistics_due_at = plan.present_at + STATISTICS_INTERVAL;
+            self.send_statistics();
+        }
+    }
+
+    fn deliver(&mut self, frame: &PresentedFrame) {
+        if frame.kind == FrameKind::Synthesised {
+            self.synthesis.add(frame.work);
+        }
+        let phase_q12 = frame.phase.q12().unsigned_abs();
+        for outlet in self.parts.mailbox.outlets().iter() {
+            let Some((slot, skipped)) = outlet.write(self.core.frame()) else { continue };
+            let message = OutputFrame {
+                stream: outlet.stream,
+                pool: outlet.pool,
+                slot,
+                kind: match frame.kind {
+                    FrameKind::Real => OutputKind::Real,
+                    FrameKind::Synthesised => OutputKind::Synthesised,
+                },
+                phase_q12,
+                sequence: frame.index,
+                key_index: frame.key_index,
+                content_time_ns: frame.content_time.as_ns(),
+                present_at_ns: frame.present_at.as_ns(),
+                skipped,
+            };
+            self.send(StreamEvent::Output(outlet.session, message));
+        }
+        if let Some(sink) = &mut self.parts.sink {
+            sink.repeat(frame.repeats_before);
+            sink.offer(frame.index, self.core.frame());
+        }
+        if let Some(key) = self.unshown.take_if(|key| key.key_index == frame.key_index) {
+            self.send(StreamEvent::Presented(Presented {
+                stream: 0,
+                phase_q12,
+                key_index: key.key_index,
+                content_time_ns: frame.content_time.as_ns(),
+                received_at_ns: key.received_at_ns,
+                present_at_ns: frame.present_at.as_ns(),
+                presented_at_ns: frame.presented_at.as_ns(),
+            }));
+        }
+    }
+
+    fn send_pacing(&self, key_index: u64) {
+        let status = self.core.pacing();
+        let (Some(slack), Some(phase_error)) = (status.slack, status.phase_error) else { return };
+        self.send(StreamEvent::Pacing(Pacing {
+            stream: 0,
+            key_index,
+            refresh_interval_ns: status.refresh_interval.as_ns().unsigned_abs(),
+            slack_ns: slack.as_ns(),
+            phase_error_ns: phase_error.as_ns(),
+        }));
+    }
+
+    fn send_statistics(&self) {
+        let keys = self.parts.mailbox.counts();
+        let frames = self.core.counts();
+        self.send(StreamEvent::Statistics(Statistics {
+            stream: 0,
+            keys_received: keys.received,
+            keys_superseded: keys.superseded,
+            keys_refused: keys.refused + self.refused,
+            presented: frames.real + frames.synthesised + frames.repeated,
+            real: frames.real,
+            synthesised: frames.synthesised,
+            repeated: frames.repeated,
+            dropped: frames.dropped,
+            synthesis_mean_ns: self.synthesis.mean_ns(),
+        }));
+    }
+
+    fn send(&self, event: StreamEvent) {
+        let ordinal = self.parts.ordinal;
+        if self.parts.events.send(FromStream { ordinal, event }).is_err() {
+            trace!("the main loop has ended");
+        }
+    }
+}
+
+impl Drop for StreamThread {
+    fn drop(&mut self) {
+        let left_out = self.parts.sink.as_ref().map_or(0, SinkWorker::left_out);
+        if left_out > 0 {
+            warn!(left_out, "the sink was too slow for some frames");
+        }
+    }
+}
+
+impl Mean {
+    fn add(&mut self, span: MonoSpan) {
+        self.sum_ns += span.as_ns().max(0).unsigned_abs();
+        self.count += 1;
+    }
+
+    fn mean_ns(&self) -> u64 {
+        self.sum_ns.checked_div(self.count).unwrap_or(0)
+    }
+}
+
+fn plane_error((field, expected, found): (String, String, String)) -> ErrorMessage {
+    ErrorMessage { code: ErrorCode::Plane, is_fatal: false, stream: None, field, expected, found }
+}
+
+/// Asks for a priority that keeps wakes on time on a busy machine. Many machines do not grant it.
+fn ask_for_real_time() {
+    use std::sync::Once;
+    use thread_priority::{
+        RealtimeThreadSchedulePolicy, ThreadPriority, ThreadPriorityValue, ThreadSchedulePolicy,
+        set_thread_priority_and_policy, thread_native_id,
+    };
+    static SAID: Once = Once::new();
+    let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
+    let priority = ThreadPriorityValue::try_from(REAL_TIME_PRIORITY)
+        .expect("the value is below 100, the highest that there is");
+    let asked = set_thread_priority_and_policy(
+        thread_native_id(),
+        ThreadPriority::Crossplatform(priority),
+        policy,
+    );
+    SAID.call_once(|| match asked {
+        Ok(()) => info!("streams run with real-time priority"),
+        Err(error) => info!(%error, "streams run without real-time priority"),
+    });
+}

@@ -1,0 +1,139 @@
+//! Key frames go in, pictures come out: at a subscriber, as PNG files, as a y4m file.
+
+mod daemon_fixture;
+
+use daemon_fixture::RunningDaemon;
+use foreframe_protocol::{DaemonMessage, DestroyStream, OutputKind, OutputReleased};
+
+const RED: [u8; 4] = [255, 0, 0, 255];
+const GREEN: [u8; 4] = [0, 255, 0, 255];
+
+#[test]
+fn a_subscriber_sees_the_keys_of_its_own_stream_as_they_are() {
+    let daemon = RunningDaemon::start("shm");
+    let mut client = daemon.connect();
+    let mut source = client.open_stream(1, 33, 17);
+    let screen = client.subscribe(1, 3);
+    for color in [RED, GREEN] {
+        let submit = client.submit(&mut source, color);
+        let frame = loop {
+            let frame = client.expect_frame(&screen);
+            if frame.key_index == submit.key_index {
+                break frame;
+            }
+            client.send(OutputReleased { pool: frame.pool, slot: frame.slot });
+        };
+        assert_eq!(screen.pixels(&frame), color.repeat(33 * 17));
+        assert!(matches!(frame.kind, OutputKind::Real), "without motion a key is shown as it is");
+        client.expect_presented(&submit);
+        client.send(OutputReleased { pool: frame.pool, slot: frame.slot });
+    }
+}
+
+#[test]
+fn png_files_hold_the_keys() {
+    let mut daemon = RunningDaemon::start("png:frames");
+    let mut client = daemon.connect();
+    let mut source = client.open_stream(1, 40, 30);
+    let submit = client.submit(&mut source, RED);
+    client.expect_presented(&submit);
+    daemon.stop();
+    let picture = image::open(daemon.path("frames/frame_000000.png")).unwrap().into_rgb8();
+    assert_eq!(picture.dimensions(), (40, 30));
+    assert!(picture.pixels().all(|pixel| pixel.0 == [255, 0, 0]));
+}
+
+#[test]
+fn a_y4m_file_holds_whole_frames() {
+    let mut daemon = RunningDaemon::start("y4m:out.y4m");
+    let mut client = daemon.connect();
+    let mut source = client.open_stream(1, 16, 8);
+    for color in [RED, GREEN] {
+        let submit = client.submit(&mut source, color);
+        client.expect_presented(&submit);
+    }
+    daemon.stop();
+    let bytes = std::fs::read(daemon.path("out.y4m")).unwrap();
+    let header = b"YUV4MPEG2 W16 H8 F120:1 Ip A1:1 C444 XCOLORRANGE=LIMITED\n";
+    let frames = bytes.strip_prefix(header).expect("the header of a 16x8 stream at 120 Hz");
+    let frame_bytes = b"FRAME\n".len() + 3 * 16 * 8;
+    assert_eq!(frames.len() % frame_bytes, 0, "{} bytes", frames.len());
+    let frames: Vec<_> = frames.chunks(frame_bytes).collect();
+    assert!(frames.len() >= 2 && frames.iter().all(|frame| frame.starts_with(b"FRAME\n")));
+    // Red is (63, 102, 240) and green (173, 42, 26) in BT.709, limited range.
+    let luma = |frame: &[u8]| frame[6];
+    assert_eq!((luma(frames[0]), luma(frames[frames.len() - 1])), (63, 173));
+}
+
+#[test]
+fn two_clients_are_served_at_once_and_each_sees_its_own() {
+    let daemon = RunningDaemon::start("shm");
+    let mut clients = [(daemon.connect(), RED), (daemon.connect(), GREEN)];
+    let mut opened: Vec<_> = clients
+        .iter_mut()
+        .map(|(client, _)| (client.open_stream(1, 8, 8), client.subscribe(1, 3)))
+        .collect();
+    for ((client, color), (source, screen)) in clients.iter_mut().zip(&mut opened) {
+        client.submit(source, *color);
+        let frame = client.expect_frame(screen);
+        assert_eq!(screen.pixels(&frame), color.repeat(64));
+    }
+}
+
+#[test]
+fn a_subscriber_to_whatever_is_shown_follows_the_newest_stream() {
+    let daemon = RunningDaemon::start("shm");
+    let mut viewer = daemon.connect();
+    viewer.send(foreframe_protocol::Subscribe { stream: 0, slots: 2 });
+    let mut player = daemon.connect();
+    let mut first = player.open_stream(1, 8, 8);
+    let screen = viewer.expect_screen(0);
+    player.submit(&mut first, RED);
+    let frame = viewer.expect_frame(&screen);
+    assert_eq!(screen.pixels(&frame), RED.repeat(64));
+
+    let mut second = player.open_stream(2, 4, 4);
+    let screen = viewer.expect_screen(0);
+    assert_eq!((screen.pool.width, screen.pool.height), (4, 4));
+    player.submit(&mut second, GREEN);
+    let frame = viewer.expect_frame(&screen);
+    assert_eq!(screen.pixels(&frame), GREEN.repeat(16));
+
+    player.send(DestroyStream { stream: 2 });
+    let screen = viewer.expect_screen(0);
+    assert_eq!((screen.pool.width, screen.pool.height), (8, 8));
+}
+
+#[test]
+fn a_subscriber_that_gives_nothing_back_loses_frames_and_the_stream_goes_on() {
+    let daemon = RunningDaemon::start("shm");
+    let mut client = daemon.connect();
+    let mut source = client.open_stream(1, 8, 8);
+    let screen = client.subscribe(1, 1);
+    let first = client.submit(&mut source, RED);
+    let frame = client.expect_frame(&screen);
+    client.expect_presented(&first);
+    for _ in 0..3 {
+        let submit = client.submit(&mut source, GREEN);
+        client.expect_presented(&submit);
+    }
+    assert_eq!(screen.pixels(&frame), RED.repeat(64), "a lent slot is never written");
+    client.send(OutputReleased { pool: frame.pool, slot: frame.slot });
+    // The release is known before the next key is.
+    let submit = client.submit(&mut source, RED);
+    let frame = client.expect_frame(&screen);
+    assert!(frame.skipped >= 1, "{frame:?}");
+    assert!(frame.key_index <= submit.key_index);
+}
+
+#[test]
+fn a_daemon_that_stops_ends_streams_and_says_goodbye() {
+    let mut daemon = RunningDaemon::start("shm");
+    let mut client = daemon.connect();
+    let _source = client.open_stream(1, 8, 8);
+    daemon.stop();
+    let said = client.read_to_end();
+    assert!(matches!(said.last(), Some(DaemonMessage::Goodbye(_))), "{said:?}");
+    assert!(said.iter().any(|it| matches!(it, DaemonMessage::StreamEnded(_))), "{said:?}");
+    assert!(!daemon.socket.exists(), "the socket is removed");
+}
