@@ -5,6 +5,9 @@
 //! integer (sign-magnitude turned into an ordered `u16`), so that integer interpolation is
 //! monotone, and weight 0 gives back the very bits that came in.
 
+#[cfg(target_arch = "x86_64")]
+mod sse2;
+
 use crate::plane::Plane;
 
 /// How the channels of a colour plane are stored.
@@ -93,10 +96,27 @@ fn mix_channel([a, b]: [u32; 2], weight: u32) -> u32 {
     (a * (256 - weight) + b * weight + 128) >> 8
 }
 
-impl Texel for Rgba8 {
-    fn bilinear(corners: [Self; 4], fx: u32, fy: u32) -> Self {
+impl Rgba8 {
+    /// The reference of [`Texel::bilinear`].
+    #[cfg(any(test, not(target_arch = "x86_64")))]
+    fn bilinear_by_channel(corners: [Self; 4], fx: u32, fy: u32) -> Self {
         let weights = bilinear_weights(fx, fy);
         Self(packed_channels(corners.map(|c| c.0), RGBA8_FIELDS, |c| weigh(c, weights)))
+    }
+}
+
+impl Texel for Rgba8 {
+    #[inline]
+    fn bilinear(corners: [Self; 4], fx: u32, fy: u32) -> Self {
+        #[cfg(target_arch = "x86_64")]
+        {
+            // SAFETY: every x86-64 processor has SSE2.
+            Self(unsafe { sse2::bilinear_rgba8(corners.map(|corner| corner.0), fx, fy) })
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        {
+            Self::bilinear_by_channel(corners, fx, fy)
+        }
     }
 
     fn mix(a: Self, b: Self, weight: u32) -> Self {
@@ -239,4 +259,61 @@ pub const fn half_to_ordered(bits: u16) -> u16 {
 #[must_use]
 pub const fn ordered_to_half(ordered: u16) -> u16 {
     if ordered & 0x8000 == 0 { !ordered } else { ordered & 0x7fff }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::hash;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn all_channels_at_once_equal_channel_by_channel(
+            corners: [u32; 4], fx in 0_u32..256, fy in 0_u32..256,
+        ) {
+            let corners = corners.map(Rgba8);
+            prop_assert_eq!(
+                Rgba8::bilinear(corners, fx, fy),
+                Rgba8::bilinear_by_channel(corners, fx, fy)
+            );
+        }
+
+        #[test]
+        fn interpolation_stays_between_its_corners(
+            corners: [[u16; 4]; 4], fx in 0_u32..256, fy in 0_u32..256,
+        ) {
+            let OrderedRgba16(mean) = OrderedRgba16::bilinear(corners.map(OrderedRgba16), fx, fy);
+            for channel in 0..4 {
+                let values = corners.map(|corner| corner[channel]);
+                prop_assert!(values.iter().min() <= Some(&mean[channel]));
+                prop_assert!(values.iter().max() >= Some(&mean[channel]));
+            }
+        }
+    }
+
+    #[test]
+    fn extreme_corners_are_weighed_exactly() {
+        for case in 0..4096 {
+            let corner = |i: u32| if hash(case, i, 0) & 1 == 0 { 0 } else { 0xff00_ff00 };
+            let corners = [0, 1, 2, 3].map(|i| Rgba8(corner(i)));
+            let (fx, fy) = (hash(case, 8, 0) & 255, hash(case, 9, 0) & 255);
+            assert_eq!(
+                Rgba8::bilinear(corners, fx, fy),
+                Rgba8::bilinear_by_channel(corners, fx, fy)
+            );
+        }
+    }
+
+    #[test]
+    fn ordered_halves_sort_as_their_values_and_come_back() {
+        let mut finite: Vec<u16> =
+            (0..=u16::MAX).filter(|bits| half::f16::from_bits(*bits).is_finite()).collect();
+        finite.sort_by_key(|bits| half_to_ordered(*bits));
+        for pair in finite.windows(2) {
+            let [a, b] = [pair[0], pair[1]].map(half::f16::from_bits);
+            assert!(a <= b, "{a} before {b}");
+        }
+        assert!((0..=u16::MAX).all(|bits| ordered_to_half(half_to_ordered(bits)) == bits));
+    }
 }

@@ -6,20 +6,24 @@ use crate::plane::{Plane, Rect};
 /// The colour at (`x`, `y`) in Q8 pixels, bilinear, clamped to the pixel centres of `valid`, which
 /// lies inside the plane.
 #[must_use]
+#[inline]
 pub fn sample<T: Texel>(plane: &Plane<T>, valid: Rect, x: i32, y: i32) -> T {
     let (x0, x1, fx) = neighbours(x, valid.x, valid.width);
     let (y0, y1, fy) = neighbours(y, valid.y, valid.height);
-    let (top, bottom) = (plane.row(y0), plane.row(y1));
-    if fx | fy == 0 {
-        return top[x0 as usize];
-    }
+    let width = plane.width() as usize;
+    let top = &plane.data()[y0 as usize * width..][..width];
     let (left, right) = (x0 as usize, x1 as usize);
+    if fx | fy == 0 {
+        return top[left];
+    }
+    let bottom = &plane.data()[y1 as usize * width..][..width];
     T::bilinear([top[left], top[right], bottom[left], bottom[right]], fx, fy)
 }
 
 /// The two pixels around a Q8 position inside `start..start + length`, and the way between them.
 #[expect(clippy::cast_sign_loss, reason = "clamped to 0 and above before the cast")]
 #[expect(clippy::cast_possible_wrap, reason = "planes are at most 8192 pixels wide and high")]
+#[inline]
 fn neighbours(position: i32, start: u32, length: u32) -> (u32, u32, u32) {
     let first = (start << 8) as i32;
     let last = ((start + length - 1) << 8) as i32;
