@@ -18,6 +18,9 @@ mod geometry;
 mod motion;
 mod motion_field;
 
+#[cfg(test)]
+mod tests;
+
 pub use error::{DecodeError, PlaneName};
 pub use motion_field::{MotionField, decode_field};
 
