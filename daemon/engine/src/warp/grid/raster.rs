@@ -8,7 +8,7 @@
 use rayon::prelude::*;
 
 use super::mesh::{Mesh, MeshTriangle};
-use super::triangle::{SourceMap, cross, pixel_range, span};
+use super::triangle::{SourceMap, Spans, cross, pixel_range};
 use crate::color::Texel;
 use crate::plane::{Plane, Rect};
 use crate::warp::sample::sample;
@@ -89,6 +89,7 @@ struct Clip {
 impl Clip {
     /// Calls `draw(y, first column, pixels)` for each part of a triangle inside, with
     /// `pixels` the indices in the band.
+    #[inline]
     #[expect(clippy::cast_sign_loss, reason = "clipped to the band, which starts at 0")]
     fn spans(
         &self,
@@ -96,8 +97,10 @@ impl Clip {
         mut draw: impl FnMut(i32, i32, std::ops::Range<usize>),
     ) {
         let [first, last] = pixel_range(triangle.moved, 1);
-        for y in first.max(self.rows[0])..(last + 1).min(self.rows[1]) {
-            let [from, to] = span(triangle.moved, y);
+        let first = first.max(self.rows[0]);
+        let mut spans = Spans::new(triangle.moved, first);
+        for y in first..(last + 1).min(self.rows[1]) {
+            let [from, to] = spans.next();
             let (from, to) = (from.max(self.columns[0]), to.min(self.columns[1]));
             if from < to {
                 let row = (y - self.top) as usize * self.width;
@@ -186,6 +189,7 @@ impl<T: Texel> Band<'_, T> {
     }
 
     /// Colours successive pixels of row `y` from column `x` on.
+    #[inline]
     fn paint(&self, map: &SourceMap, y: i32, x: i32, pixels: &mut [T]) {
         if let Some(source) = self.whole_pixels(map, y, x, pixels.len()) {
             pixels.copy_from_slice(source);

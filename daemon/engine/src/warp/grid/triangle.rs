@@ -19,46 +19,105 @@ pub(super) fn pixel_range(moved: [Point; 3], axis: usize) -> [i32; 2] {
     [(a.min(b).min(c) + 15) >> 4, a.max(b).max(c) >> 4]
 }
 
-/// Columns `first..end` of pixel row `y` whose centres lie in the triangle, which has positive
-/// orientation.
+/// Walks down the pixel rows of a triangle of positive orientation, a span of columns per row.
 ///
 /// An edge from `a` to `b` has a pixel centre `p` inside when
 /// `E = (b.x - a.x) (p.y - a.y) - (b.y - a.y) (p.x - a.x) >= t`, with `t` 0 on the edges of the
 /// top-left rule and 1 on others, so that a centre on an edge that two triangles share belongs to
-/// exactly one. `E` falls or rises along a row, so each edge gives one bound of the columns.
-pub(super) fn span(moved: [Point; 3], y: i32) -> [i32; 2] {
-    let [origin, last] = pixel_range(moved, 0);
-    let (mut first, mut end) = (0, last - origin + 1);
-    for [a, b] in [[moved[0], moved[1]], [moved[1], moved[2]], [moved[2], moved[0]]] {
-        let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
-        let is_top_left = dy < 0 || (dy == 0 && dx > 0);
-        let threshold = i32::from(!is_top_left);
-        let across = dx * (16 * y - a[1]);
-        let from_origin = a[0] - 16 * origin;
-        if dy < 0 {
-            // -dy (16 x - from_origin) >= threshold - across
-            let bound = threshold - across - dy * from_origin;
-            first = first.max(ceil_div(bound, -16 * dy));
-        } else if dy > 0 {
-            // dy (16 x - from_origin) <= across - threshold
-            let bound = across - threshold + dy * from_origin;
-            end = end.min(floor_div(bound, 16 * dy) + 1);
-        } else if across < threshold {
-            return [origin, origin];
-        }
+/// exactly one. `E` falls or rises along a row, so each edge gives one bound of the columns; from
+/// row to row its numerator grows by a constant, so quotient and remainder are carried along.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Spans {
+    origin: i32,
+    last: i32,
+    edges: [Edge; 3],
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Edge {
+    /// Columns from `-quotient` on are inside.
+    Left(Ratio),
+    /// Columns up to `quotient` are inside.
+    Right(Ratio),
+    /// The whole row is inside while `value` is not negative; it grows by `step`.
+    Level { value: i32, step: i32 },
+}
+
+impl Spans {
+    /// Starts at pixel row `y`.
+    pub(super) fn new(moved: [Point; 3], y: i32) -> Self {
+        let [origin, last] = pixel_range(moved, 0);
+        let edge = |a: Point, b: Point| {
+            let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+            let threshold = i32::from(!(dy < 0 || (dy == 0 && dx > 0)));
+            let (value, step) = (dx * (16 * y - a[1]) - threshold, 16 * dx);
+            // E - t = value - dy (16 x - from_origin), x counted from the origin.
+            let value = value + dy * (a[0] - 16 * origin);
+            match dy {
+                0 => Edge::Level { value, step },
+                _ if dy < 0 => Edge::Left(Ratio::new(value, step, -16 * dy)),
+                _ => Edge::Right(Ratio::new(value, step, 16 * dy)),
+            }
+        };
+        let [a, b, c] = moved;
+        Self { origin, last, edges: [edge(a, b), edge(b, c), edge(c, a)] }
     }
-    [origin + first, origin + end.max(first)]
+
+    /// First and end column of the row, and on to the next.
+    #[inline]
+    pub(super) fn next(&mut self) -> [i32; 2] {
+        let (mut first, mut end) = (0, self.last - self.origin + 1);
+        for edge in &mut self.edges {
+            match edge {
+                Edge::Left(ratio) => first = first.max(-ratio.next()),
+                Edge::Right(ratio) => end = end.min(ratio.next() + 1),
+                Edge::Level { value, step } => {
+                    if *value < 0 {
+                        end = 0;
+                    }
+                    *value += *step;
+                }
+            }
+        }
+        [self.origin + first, self.origin + end.max(first)]
+    }
+}
+
+/// `floor(value / divisor)` while `value` grows by a constant; `divisor` is positive.
+#[derive(Clone, Copy, Debug)]
+struct Ratio {
+    quotient: i32,
+    remainder: i32,
+    step_quotient: i32,
+    step_remainder: i32,
+    divisor: i32,
+}
+
+impl Ratio {
+    fn new(value: i32, step: i32, divisor: i32) -> Self {
+        let (quotient, step_quotient) = (floor_div(value, divisor), floor_div(step, divisor));
+        let remainder = value - quotient * divisor;
+        let step_remainder = step - step_quotient * divisor;
+        Self { quotient, remainder, step_quotient, step_remainder, divisor }
+    }
+
+    #[inline]
+    fn next(&mut self) -> i32 {
+        let quotient = self.quotient;
+        self.quotient += self.step_quotient;
+        self.remainder += self.step_remainder;
+        if self.remainder >= self.divisor {
+            self.remainder -= self.divisor;
+            self.quotient += 1;
+        }
+        quotient
+    }
 }
 
 /// Rounds towards minus infinity; `divisor` is positive.
 fn floor_div(value: i32, divisor: i32) -> i32 {
     let magnitude = |value: i32| (value.cast_unsigned() / divisor.cast_unsigned()).cast_signed();
     if value >= 0 { magnitude(value) } else { !magnitude(!value) }
-}
-
-/// Rounds towards plus infinity; `divisor` is positive.
-fn ceil_div(value: i32, divisor: i32) -> i32 {
-    -floor_div(-value, divisor)
 }
 
 /// The affine map from target to source of one triangle, equation (2).
@@ -98,6 +157,7 @@ impl SourceMap {
     }
 
     /// Source of the pixel in column `x` of row `y`, Q8 px.
+    #[inline]
     pub(super) fn at(&self, x: i32, y: i32) -> [i32; 2] {
         let [xx, xy, yx, yy] = self.gradient;
         let (dx, dy) = (16 * x - self.moved[0], 16 * y - self.moved[1]);
@@ -108,6 +168,7 @@ impl SourceMap {
     }
 }
 
+#[inline]
 fn q8(source: i32, relative: i32) -> i32 {
     source * 16 + (relative.wrapping_add(1 << 15) >> 16)
 }
