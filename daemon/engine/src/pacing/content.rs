@@ -24,10 +24,8 @@ const RELEASE_TIME: MonoSpan = MonoSpan::from_ms(4_000);
 const FASTEST_SLEW_DIVISOR: i64 = 32;
 /// Content time that leaps ahead by more was set, not jittered.
 const FORWARD_STEP: MonoSpan = MonoSpan::from_ms(250);
-/// So many keys in a row that lag by [`LAG_INTERVALS`] have a new delay.
-const LAGGING_KEYS: u32 = 8;
-/// Lag, in key intervals, that the slew alone would take too long to follow.
-const LAG_INTERVALS: i64 = 2;
+/// So many keys in a row that lag by more than the caller allows have a new delay: 0.4 s at 40 Hz.
+const LAGGING_KEYS: u32 = 16;
 
 /// What a key meant for the clock.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -36,7 +34,8 @@ pub(super) enum KeyTiming {
     Followed,
     /// The application's clock was stepped; content time starts anew from this key.
     Stepped,
-    /// Keys have fallen behind for good; the clock follows them, content time goes on.
+    /// Keys have fallen behind for good and the clock has followed; what was shown last is ahead of
+    /// it for a moment.
     Relocked,
 }
 
@@ -59,13 +58,13 @@ struct Line {
 }
 
 impl ContentClock {
-    /// A key has arrived that `first_refresh` is the first to show. `interval` is the usual time
-    /// from key to key, if known; a cut lets the line jump, for nobody can see it.
+    /// A key has arrived that `first_refresh` is the first to show. Lag beyond `lag_limit` is no
+    /// jitter if it lasts; a cut lets the line jump at once, for nobody can see it.
     pub(super) fn on_key(
         &mut self,
         content_time: MonoTime,
         first_refresh: MonoTime,
-        interval: Option<MonoSpan>,
+        lag_limit: MonoSpan,
         is_cut: bool,
     ) -> KeyTiming {
         let offer = first_refresh - content_time;
@@ -84,13 +83,13 @@ impl ContentClock {
         if is_cut {
             self.line = self.target.map(|delay| Line { present_at: first_refresh, delay });
         }
-        let limit = interval.map_or(FORWARD_STEP, |interval| interval.scale(LAG_INTERVALS, 1));
-        self.lagging = if offer > line.delay + limit { self.lagging + 1 } else { 0 };
+        self.lagging = if offer > line.delay + lag_limit { self.lagging + 1 } else { 0 };
         if self.lagging < LAGGING_KEYS {
             return KeyTiming::Followed;
         }
         self.offers.keep_newest(LAGGING_KEYS as usize);
         self.target = self.offers.min();
+        self.line = self.target.map(|delay| Line { present_at: first_refresh, delay });
         self.lagging = 0;
         KeyTiming::Relocked
     }
@@ -124,5 +123,73 @@ impl ContentClock {
         assert_eq!(self.target, self.offers.min(), "a stale target: {self:?}");
         assert!(self.offers.len() <= WINDOW, "window overflow: {}", self.offers.len());
         assert!(self.lagging < LAGGING_KEYS, "a relock was missed: {self:?}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LAG_LIMIT: MonoSpan = MonoSpan::from_ms(20);
+
+    fn ms(ms: i64) -> MonoTime {
+        MonoTime::ZERO + MonoSpan::from_ms(ms)
+    }
+
+    /// Keys every 25 ms whose first refresh is `offers` after their content time.
+    fn clock(offers: impl IntoIterator<Item = i64>) -> (ContentClock, Vec<KeyTiming>) {
+        let mut clock = ContentClock::default();
+        let timings = (10..)
+            .zip(offers)
+            .map(|(key, offer)| clock.on_key(ms(key * 25), ms(key * 25 + offer), LAG_LIMIT, false));
+        let timings = timings.collect();
+        (clock, timings)
+    }
+
+    #[test]
+    fn the_delay_follows_the_smallest_offer_without_a_jump() {
+        let (mut clock, _) = clock([16, 16, 10]);
+        let delays: Vec<i64> = (1..=200)
+            .map(|frame| {
+                let present_at = ms(320 + frame * 8);
+                let delay = clock.delay_at(present_at).unwrap();
+                clock.go_on_from(present_at, delay);
+                delay.as_ns()
+            })
+            .collect();
+        let steepest = delays.windows(2).map(|pair| pair[0] - pair[1]).max().unwrap();
+        assert!(steepest <= 8_000_000 / FASTEST_SLEW_DIVISOR, "{steepest} ns in a frame");
+        assert!(delays.is_sorted_by(|a, b| a >= b), "{delays:?}");
+        assert!((10_000_000..10_300_000).contains(delays.last().unwrap()), "{delays:?}");
+    }
+
+    #[test]
+    fn one_late_key_is_forgotten_and_many_move_the_clock_at_once() {
+        let late_once = (0..100).map(|key| if key == 50 { 90 } else { 10 });
+        let (late, timings) = clock(late_once);
+        assert!(timings.iter().all(|&timing| timing == KeyTiming::Followed));
+        assert_eq!(late.delay_at(ms(10_000)), Some(MonoSpan::from_ms(10)));
+        let (stuck, timings) = clock((0..100).map(|key| if key < 50 { 10 } else { 90 }));
+        let relocks = timings.iter().filter(|&&timing| timing == KeyTiming::Relocked);
+        assert_eq!(relocks.count(), 1);
+        assert_eq!(stuck.delay_at(ms(2_800)), Some(MonoSpan::from_ms(90)));
+    }
+
+    #[test]
+    fn steps_of_the_application_clock_start_it_anew() {
+        let (mut clock, _) = clock([10; 10]);
+        let leap = clock.on_key(ms(1_500), ms(510), LAG_LIMIT, false);
+        assert_eq!(leap, KeyTiming::Stepped);
+        assert_eq!(clock.delay_at(ms(510)), Some(MonoSpan::from_ms(-990)));
+        let back = clock.on_key(ms(1_499), ms(535), LAG_LIMIT, false);
+        assert_eq!(back, KeyTiming::Stepped);
+        clock.verify_invariants();
+    }
+
+    #[test]
+    fn at_a_cut_the_delay_takes_its_target_at_once() {
+        let (mut clock, _) = clock([10; 10]);
+        clock.on_key(ms(500), ms(504), LAG_LIMIT, true);
+        assert_eq!(clock.delay_at(ms(504)), Some(MonoSpan::from_ms(4)));
     }
 }

@@ -27,6 +27,8 @@ mod pacer;
 mod recent;
 mod refresh;
 pub mod sim;
+#[cfg(test)]
+mod tests;
 mod timer;
 
 pub use budget::WorkEstimate;

@@ -127,8 +127,7 @@ impl Pacer {
         self.refresh.anchor_at(arrived_at + self.budget());
         let first_refresh = self.first_reachable(arrived_at);
         self.learn_slack(first_refresh - self.budget() - arrived_at);
-        let interval = self.cadence.interval();
-        match self.clock.on_key(content_time, first_refresh, interval, is_cut) {
+        match self.clock.on_key(content_time, first_refresh, self.lag_limit(), is_cut) {
             KeyTiming::Followed => self.cadence.on_key(content_time, first_refresh),
             KeyTiming::Stepped => {
                 self.counts.clock_steps += 1;
@@ -138,9 +137,6 @@ impl Pacer {
             KeyTiming::Relocked => {
                 self.counts.relocks += 1;
                 self.cadence.on_clock_step(content_time);
-                if let (Some(target), Some(content)) = (self.last_target, self.last_content) {
-                    self.clock.go_on_from(target, target - content);
-                }
             }
         }
         if is_cut {
@@ -274,6 +270,13 @@ impl Pacer {
             if lead < same { newest } else { newest + lead }
         };
         Some(self.last_content.map_or(content, |shown| content.max(shown)))
+    }
+
+    /// By how much keys may lag behind the best of them without being stuck there: half an interval
+    /// of jitter, and the refresh that a key may just have missed.
+    fn lag_limit(&self) -> MonoSpan {
+        let interval = self.cadence.interval().unwrap_or(MonoSpan::MAX);
+        interval.scale(1, 2) + self.refresh.interval()
     }
 
     fn learn_slack(&mut self, slack: MonoSpan) {

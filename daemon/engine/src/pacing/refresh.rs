@@ -128,3 +128,82 @@ fn fixed(time: MonoTime) -> i128 {
 fn saturate(ns: i128) -> i64 {
     i64::try_from(ns).unwrap_or(if ns < 0 { i64::MIN } else { i64::MAX })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pacing::sim::SplitMix64;
+
+    const START: MonoTime = MonoTime::ZERO;
+
+    /// Timestamps of a display whose period is `ppm` longer than announced, +- `jitter`.
+    fn watched(hz: f64, ppm: i64, jitter: MonoSpan, frames: i64) -> (RefreshTracker, MonoSpan) {
+        let announced = MonoSpan::from_hz(hz);
+        let truth = announced.scale(1_000_000 + ppm, 1_000_000);
+        let mut tracker = RefreshTracker::new(announced, None);
+        let mut chance = SplitMix64::new(1);
+        for frame in 1..=frames {
+            tracker.on_presented(START + truth.scale(frame, 1) + chance.within(jitter));
+            tracker.verify_invariants();
+        }
+        (tracker, truth)
+    }
+
+    #[test]
+    fn after_120_noisy_frames_the_next_refresh_is_predicted_within_a_tenth_of_a_millisecond() {
+        for hz in [48.0, 59.94, 60.0, 119.88, 144.0, 240.0] {
+            for ppm in [-200, 0, 200] {
+                let (mut tracker, truth) = watched(hz, ppm, MonoSpan::from_us(100), 120);
+                let mut chance = SplitMix64::new(2);
+                let mut hits = 0;
+                for frame in 121..=1_120 {
+                    let next = START + truth.scale(frame, 1);
+                    let predicted = tracker.at_or_after(next - truth.scale(1, 2));
+                    let error = (predicted - next).max(next - predicted);
+                    hits += i32::from(error <= MonoSpan::from_us(100));
+                    tracker.on_presented(next + chance.within(MonoSpan::from_us(100)));
+                }
+                assert!(hits >= 950, "{hz} Hz {ppm} ppm: {hits} of 1000 within 0.1 ms");
+            }
+        }
+    }
+
+    #[test]
+    fn wild_timestamps_are_counted_and_not_followed_unless_they_agree() {
+        let (mut tracker, truth) = watched(120.0, 0, MonoSpan::ZERO, 100);
+        let shifted = truth.scale(1, 2);
+        let next = START + truth.scale(101, 1);
+        tracker.on_presented(next + shifted);
+        assert_eq!(tracker.at_or_after(next), next);
+        assert_eq!(tracker.outliers(), 1);
+        for frame in 102..=107 {
+            tracker.on_presented(START + truth.scale(frame, 1) + shifted);
+        }
+        assert_eq!(tracker.at_or_after(next), next + shifted);
+    }
+
+    #[test]
+    fn frames_shown_whole_refreshes_late_leave_the_grid_alone() {
+        let (mut tracker, truth) = watched(60.0, 0, MonoSpan::ZERO, 50);
+        tracker.on_presented(START + truth.scale(53, 1));
+        assert_eq!(tracker.interval(), truth);
+        assert_eq!(tracker.at_or_after(START + truth.scale(60, 1)), START + truth.scale(60, 1));
+    }
+
+    #[test]
+    fn old_feedback_changes_nothing() {
+        let (mut tracker, truth) = watched(60.0, 0, MonoSpan::ZERO, 50);
+        let before = format!("{tracker:?}");
+        tracker.on_presented(START + truth.scale(40, 1) + MonoSpan::from_us(800));
+        assert_eq!(format!("{tracker:?}"), before);
+    }
+
+    #[test]
+    fn the_grid_does_not_drift_by_rounding() {
+        let third = MonoSpan::from_ns(16_666_667);
+        let tracker = RefreshTracker::new(third, Some(START));
+        let far = START + third.scale(10_000_000, 1);
+        assert_eq!(tracker.at_or_after(far), far);
+        assert_eq!(tracker.at_or_after(far + MonoSpan::from_ns(1)), far + third);
+    }
+}

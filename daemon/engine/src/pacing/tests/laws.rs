@@ -1,0 +1,260 @@
+//! Laws of the pacer under any sequence of events.
+//!
+//! A [`World`] holds a pacer, an application and a display; [`Op`]s happen to it; every plan and
+//! every started frame is checked.
+
+use proptest::prelude::*;
+
+use crate::pacing::{Pacer, PacerConfig, Plan, WorkEstimate};
+use crate::time::{MonoSpan, MonoTime};
+
+/// What can happen.
+#[derive(Clone, Debug)]
+enum Op {
+    /// Time passes, keys arrive evenly but for +-`jitter_us` of content time, frames are made.
+    Run { ms: u16, jitter_us: i32 },
+    /// Time passes without keys, frames are made.
+    Stall { ms: u16 },
+    /// So many keys arrive at once.
+    Burst { keys: u8 },
+    /// The application's clock is set.
+    ClockStep { ms: i32 },
+    /// A key that nothing before relates to.
+    Cut,
+    /// From now on the display shows frames one refresh late.
+    MissVblank(bool),
+    /// From now on feedback comes like this.
+    Feedback(FeedbackMode),
+    /// Making a frame takes so long from now on.
+    Work { us: u16 },
+    /// Time passes and nobody plans, as in a process that was stopped.
+    Sleep { ms: u16 },
+}
+
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum FeedbackMode {
+    Prompt,
+    /// Only when three more frames have been started.
+    Late,
+    /// Each pair of frames the wrong way round.
+    OutOfOrder,
+    Absent,
+    /// Off by a third of a refresh and more.
+    Wild,
+}
+
+fn op() -> impl Strategy<Value = Op> {
+    let feedback = prop_oneof![
+        Just(FeedbackMode::Prompt),
+        Just(FeedbackMode::Late),
+        Just(FeedbackMode::OutOfOrder),
+        Just(FeedbackMode::Absent),
+        Just(FeedbackMode::Wild),
+    ];
+    prop_oneof![
+        4 => (1_u16..400, -9_000_i32..9_000).prop_map(|(ms, jitter_us)| Op::Run { ms, jitter_us }),
+        1 => (1_u16..600).prop_map(|ms| Op::Stall { ms }),
+        1 => (1_u8..6).prop_map(|keys| Op::Burst { keys }),
+        1 => (-900_i32..900).prop_map(|ms| Op::ClockStep { ms }),
+        1 => Just(Op::Cut),
+        1 => any::<bool>().prop_map(Op::MissVblank),
+        1 => feedback.prop_map(Op::Feedback),
+        1 => (0_u16..12_000).prop_map(|us| Op::Work { us }),
+        1 => (1_u16..300).prop_map(|ms| Op::Sleep { ms }),
+    ]
+}
+
+struct World {
+    pacer: Pacer,
+    interpolates: bool,
+    now: MonoTime,
+    refresh: MonoSpan,
+    key_interval: MonoSpan,
+    next_key: MonoTime,
+    /// Content time minus arrival of the application's keys.
+    app_clock: MonoSpan,
+    newest: Option<MonoTime>,
+    /// Last started frame, until the application's clock is set back or a cut comes.
+    started: Option<Plan>,
+    last_target: MonoTime,
+    key_since_start: bool,
+    is_late: bool,
+    feedback: FeedbackMode,
+    waiting: Vec<(MonoTime, MonoTime)>,
+    work: MonoSpan,
+}
+
+impl World {
+    fn new(refresh_hz: f64, key_hz: f64, interpolates: bool) -> Self {
+        let refresh = MonoSpan::from_hz(refresh_hz);
+        Self {
+            pacer: Pacer::new(PacerConfig {
+                refresh_interval: refresh,
+                known_refresh: None,
+                interpolates,
+                work: WorkEstimate::Measured,
+            }),
+            interpolates,
+            now: MonoTime::from_ns(5_000_000_000),
+            refresh,
+            key_interval: MonoSpan::from_hz(key_hz),
+            next_key: MonoTime::from_ns(5_000_000_000),
+            app_clock: MonoSpan::from_ms(-20),
+            newest: None,
+            started: None,
+            last_target: MonoTime::ZERO,
+            key_since_start: false,
+            is_late: false,
+            feedback: FeedbackMode::Prompt,
+            waiting: vec![],
+            work: MonoSpan::from_ms(2),
+        }
+    }
+
+    fn apply(&mut self, op: &Op) -> Result<(), TestCaseError> {
+        match *op {
+            Op::Run { ms, jitter_us } => self.run(ms, Some(jitter_us))?,
+            Op::Stall { ms } => {
+                self.run(ms, None)?;
+                self.next_key = self.now;
+            }
+            Op::Burst { keys } => (0..keys).for_each(|_| self.key(MonoSpan::ZERO, false)),
+            Op::ClockStep { ms } => self.app_clock += MonoSpan::from_ms(ms.into()),
+            Op::Cut => self.key(MonoSpan::ZERO, true),
+            Op::MissVblank(is_late) => self.is_late = is_late,
+            Op::Feedback(mode) => self.feedback = mode,
+            Op::Work { us } => self.work = MonoSpan::from_us(us.into()),
+            Op::Sleep { ms } => {
+                self.now += MonoSpan::from_ms(ms.into());
+                self.next_key = self.now;
+            }
+        }
+        self.checked_plan()?;
+        self.pacer.verify_invariants();
+        Ok(())
+    }
+
+    fn key(&mut self, jitter: MonoSpan, is_cut: bool) {
+        let content_time = self.now + self.app_clock + jitter;
+        if is_cut || self.newest.is_some_and(|newest| content_time < newest) {
+            self.started = None;
+        }
+        self.pacer.on_key(content_time, self.now, is_cut);
+        self.newest = Some(content_time);
+        self.key_since_start = true;
+    }
+
+    /// Lives through `ms`; keys arrive if they have a jitter.
+    fn run(&mut self, ms: u16, jitter_us: Option<i32>) -> Result<(), TestCaseError> {
+        let end = self.now + MonoSpan::from_ms(ms.into());
+        let mut sign = 1;
+        loop {
+            let plan = self.checked_plan()?;
+            let key_at = jitter_us.map_or(MonoTime::FAR_FUTURE, |_| self.next_key.max(self.now));
+            self.now = key_at.min(plan.wake_at).min(end);
+            if self.now == end {
+                return Ok(());
+            }
+            if let (true, Some(us)) = (self.now == key_at, jitter_us) {
+                self.key(MonoSpan::from_us(i64::from(us) * sign), false);
+                self.next_key = key_at + self.key_interval;
+                sign = -sign;
+            } else {
+                self.start(&plan)?;
+            }
+        }
+    }
+
+    fn start(&mut self, plan: &Plan) -> Result<(), TestCaseError> {
+        prop_assert!(plan.present_at > self.last_target, "targets strictly increase");
+        if let Some((old, new)) =
+            self.started.and_then(|old| old.content_time.zip(plan.content_time))
+        {
+            let passed = plan.present_at - self.last_target;
+            prop_assert!(new >= old, "content time ran back by {:?}", old - new);
+            if !self.key_since_start && !self.interpolates {
+                let fastest = passed + passed.scale(1, 32) + MonoSpan::from_ns(2);
+                prop_assert!(new - old <= fastest, "{:?} of content in {passed:?}", new - old);
+            }
+        }
+        self.pacer.start(plan);
+        self.last_target = plan.present_at;
+        self.started = Some(*plan);
+        self.key_since_start = false;
+        if self.now + self.work > plan.submit_by {
+            self.pacer.on_dropped();
+        } else {
+            self.shown(plan.present_at);
+        }
+        self.pacer.on_work(self.work);
+        Ok(())
+    }
+
+    fn shown(&mut self, planned: MonoTime) {
+        let late = if self.is_late { self.refresh } else { MonoSpan::ZERO };
+        let wild = if self.feedback == FeedbackMode::Wild {
+            self.refresh.scale((planned.as_ns() % 100).cast_signed() + 36, 100)
+        } else {
+            MonoSpan::ZERO
+        };
+        self.waiting.push((planned, planned + late + wild));
+        let held_back = match self.feedback {
+            FeedbackMode::Prompt | FeedbackMode::Wild => 0,
+            FeedbackMode::Late => 3,
+            FeedbackMode::OutOfOrder => self.waiting.len() % 2,
+            FeedbackMode::Absent => return self.waiting.clear(),
+        };
+        if self.feedback == FeedbackMode::OutOfOrder {
+            self.waiting.reverse();
+        }
+        for (planned, presented_at) in
+            self.waiting.drain(..self.waiting.len().max(held_back) - held_back)
+        {
+            self.pacer.on_presented(planned, presented_at);
+        }
+    }
+
+    /// The laws of a plan.
+    fn checked_plan(&mut self) -> Result<Plan, TestCaseError> {
+        let plan = self.pacer.plan(self.now);
+        prop_assert_eq!(plan, self.pacer.plan(self.now), "planning changes nothing");
+        prop_assert!(plan.wake_at >= self.now, "the wake lies in the past: {:?}", plan);
+        prop_assert!(plan.wake_at <= plan.submit_by && plan.submit_by <= plan.present_at);
+        prop_assert!(plan.present_at > self.last_target, "a refresh was taken twice: {:?}", plan);
+        let status = self.pacer.status();
+        let ready = self.now + status.work + status.margin;
+        prop_assert!(plan.present_at >= ready, "not enough time: {:?}", plan);
+        let half = status.refresh_interval.scale(1, 2);
+        let latest = ready.max(self.last_target + half) + status.refresh_interval;
+        prop_assert!(plan.present_at <= latest, "a refresh was passed over: {:?}", plan);
+        prop_assert_eq!(plan.content_time.is_some(), self.newest.is_some());
+        if let Some((content, newest)) = plan.content_time.zip(self.newest) {
+            if !self.interpolates {
+                prop_assert!(content >= newest, "negative phase: {:?}", content - newest);
+            }
+            if self.started.is_none() {
+                let interval = status.key_interval.unwrap_or(MonoSpan::from_ms(25));
+                let longest = interval.scale(4, 1);
+                prop_assert!(content - newest <= longest, "phase {:?}", content - newest);
+            }
+        }
+        Ok(plan)
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(256))]
+
+    #[test]
+    fn whatever_happens_the_laws_of_plans_and_content_time_hold(
+        refresh_hz in prop::sample::select(vec![48.0, 59.94, 60.0, 119.88, 120.0, 144.0, 240.0]),
+        key_hz in 20.0_f64..70.0,
+        interpolates in prop::bool::weighted(0.2),
+        ops in prop::collection::vec(op(), 1..40),
+    ) {
+        let mut world = World::new(refresh_hz, key_hz, interpolates);
+        for op in &ops {
+            world.apply(op)?;
+        }
+    }
+}
