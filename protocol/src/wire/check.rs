@@ -55,10 +55,14 @@ impl Check {
         field: &'static str,
         part: &T,
     ) -> Result<()> {
-        if part.as_bytes().iter().all(|&byte| byte == 0) {
-            return Ok(());
+        let used = part.as_bytes().iter().enumerate().find(|&(_, &byte)| byte != 0);
+        match used {
+            None => Ok(()),
+            Some((index, byte)) => {
+                let found = format!("{byte} in byte {index}");
+                self.fail(field, "zero bytes where the part is absent or reserved", found)
+            }
         }
-        self.fail(field, "zero bytes where the part is absent or reserved", "other bytes")
     }
 
     pub(crate) fn range(self, field: &'static str, value: u64, min: u64, max: u64) -> Result<()> {
