@@ -182,7 +182,9 @@ impl StreamOptions {
         Err(Error::Option { option: "row_align", expected, found: row_align.to_string() })
     }
 
-    pub(crate) fn to_message(self, stream: u32) -> CreateStream {
+    /// The message that declares such a stream under this number: what a capture writer records.
+    #[must_use]
+    pub fn to_message(self, stream: u32) -> CreateStream {
         let max_sizes = PlaneMap::from_fn(|kind| {
             self.format.bytes_per_pixel(kind)?;
             Some(match kind {
