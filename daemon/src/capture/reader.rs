@@ -177,6 +177,16 @@ impl<S: ReadAt> Capture<S> {
         self.parse_submit(entry, &record)
     }
 
+    /// The submit message of a frame and what each of its planes is, without any pixels.
+    ///
+    /// # Errors
+    /// If there is no such frame, or its record cannot be read.
+    pub fn describe(&self, number: usize) -> Result<(Submit, Vec<PlaneInfo>), CaptureError> {
+        let (entry, record) = self.record(number)?;
+        let submit = self.parse_submit(entry, &record)?;
+        Ok((submit, record.planes.iter().map(|plane| plane.info).collect()))
+    }
+
     /// A frame with all its planes.
     ///
     /// # Errors
