@@ -12,3 +12,4 @@ pub mod output;
 pub mod pictures;
 pub mod recording;
 pub mod score;
+pub mod virtual_time;

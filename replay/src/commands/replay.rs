@@ -1,15 +1,190 @@
-//! `foreframe replay`.
+//! `foreframe replay`: a capture through the daemon's stream on virtual time, with digests.
 
+use std::fmt::Write as _;
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use anyhow::{Context as _, bail, ensure};
+use foreframe_engine::{Method, MonoSpan};
+use foreframed::config::{Backend, SinkSpec};
+use foreframed::sink::Sink;
+use serde::Serialize;
+
+use super::score::all_processors;
 use crate::output::Output;
+use crate::recording::Recording as _;
+use crate::recording::capture::CaptureRecording;
+use crate::recording::keys::KeyReader;
+use crate::recording::plan::Plan;
+use crate::virtual_time::digest::FrameDigester;
+use crate::virtual_time::keys::{KeyTiming, timed_keys};
+use crate::virtual_time::{OutputFrame, OutputKind, ReplayConfig, replay};
 
 /// Arguments of `foreframe replay`.
 #[derive(clap::Args, Debug)]
-pub struct Args {}
+pub struct Args {
+    /// The capture.
+    #[arg(value_name = "FILE.mcap")]
+    pub capture: PathBuf,
+    /// How in-between frames are made: hold, blend, gather, grid or linear.
+    #[arg(long, default_value_t = Method::Linear)]
+    pub method: Method,
+    /// What the engine runs on.
+    #[arg(long, value_enum, default_value_t = Backend::Auto)]
+    pub backend: Backend,
+    /// Refresh rate of the virtual display, 1 to 1000.
+    #[arg(long, value_name = "HZ", default_value_t = 120.0)]
+    pub refresh: f64,
+    /// Threads of the engine, which do not change the result [default: as many as there are
+    /// processors]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+    /// Take every N-th frame as a key, from frame 0, and leave out the others.
+    #[arg(long, value_name = "N", default_value = "1")]
+    pub ratio: NonZeroUsize,
+    /// Where output frames go: null, png:DIR or y4m:PATH.
+    #[arg(long, default_value = "null", value_parser = parse_sink)]
+    pub sink: SinkSpec,
+    /// Keys arrive when they arrived at the recorder. The default.
+    #[arg(long, conflicts_with = "step")]
+    pub as_recorded: bool,
+    /// Keys arrive in step with their content times, without the jitter of the recording.
+    #[arg(long)]
+    pub step: bool,
+}
 
-/// Runs the command.
+/// Standard output holds the digests, and nobody can subscribe to a replay.
+fn parse_sink(spec: &str) -> Result<SinkSpec, String> {
+    match spec.parse()? {
+        SinkSpec::Shm | SinkSpec::Y4mStdout => {
+            Err(format!("expected null, png:DIR or y4m:PATH, found `{spec}`"))
+        }
+        sink => Ok(sink),
+    }
+}
+
+/// Everything that was replayed.
+#[derive(Clone, Debug, Serialize)]
+struct Replayed {
+    digest: String,
+    method: &'static str,
+    keys: usize,
+    refused: usize,
+    dropped: u64,
+    frames: Vec<ReplayedFrame>,
+}
+
+/// One refresh of the virtual display. Times of presentation count from the first one.
+#[derive(Clone, Debug, Serialize)]
+struct ReplayedFrame {
+    present_at_ns: i64,
+    content_time_ns: u64,
+    key: u64,
+    phase: f64,
+    kind: OutputKind,
+    digest: String,
+}
+
+/// Replays the capture and prints a line per output frame, or JSON.
 ///
 /// # Errors
-/// Always, until it exists.
-pub fn run(_args: &Args, _output: &Output) -> anyhow::Result<()> {
-    anyhow::bail!("replay does not exist yet")
+/// If the capture cannot be read, or a frame cannot be written.
+pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
+    ensure!(
+        (1.0..=1000.0).contains(&args.refresh),
+        "--refresh: expected 1 to 1000 Hz, found {}",
+        args.refresh
+    );
+    let name = args.capture.display();
+    let mut recording = CaptureRecording::open(&args.capture)?;
+    for warning in recording.warnings()? {
+        eprintln!("foreframe: {name}: {warning}");
+    }
+    if recording.heads().is_empty() {
+        bail!("{name}: expected at least one whole frame, found none");
+    }
+    let plan = Plan::new(recording.heads(), args.ratio);
+    let reader = KeyReader::new(recording.format(), &plan)?;
+    let refresh_interval = MonoSpan::from_hz(args.refresh);
+    let config = ReplayConfig {
+        method: args.method,
+        threads: args.threads.unwrap_or_else(all_processors),
+        refresh_interval,
+    };
+    let timing = if args.step { KeyTiming::Stepped } else { KeyTiming::AsRecorded };
+    let mut sink = Sink::open(&args.sink, reader.format(), refresh_interval, 0)
+        .with_context(|| format!("--sink {}", args.sink))?;
+
+    let progress = output.progress("replaying", plan.keys.len() as u64);
+    let keys = timed_keys(&mut recording, &reader, &plan, timing).inspect(|_| progress.inc(1));
+    let mut digester = FrameDigester::default();
+    let mut frames: Vec<ReplayedFrame> = Vec::new();
+    let mut first = None;
+    let losses = replay(*reader.format(), &config, keys, |frame, picture| {
+        match frame.kind {
+            OutputKind::Repeated => sink.repeat(),
+            OutputKind::Real | OutputKind::Synthesised => sink.write(frame.index, picture),
+        }
+        .with_context(|| format!("writing output frame {} to {}", frame.index, args.sink))?;
+        let origin = *first.get_or_insert(frame.present_at);
+        let digest = digester.add(picture);
+        frames.push(ReplayedFrame::new(frame, (frame.present_at - origin).as_ns(), digest));
+        Ok(())
+    })
+    .with_context(|| format!("replaying {name}"))?;
+    progress.finish_and_clear();
+    for refused in &losses.refused {
+        eprintln!("foreframe: {name}: refused {refused}");
+    }
+    let replayed = Replayed {
+        digest: digester.all(),
+        method: args.method.name(),
+        keys: plan.keys.len(),
+        refused: losses.refused.len(),
+        dropped: losses.dropped,
+        frames,
+    };
+    output.result(&replayed, &replayed.to_text())
+}
+
+impl ReplayedFrame {
+    fn new(frame: &OutputFrame, present_at_ns: i64, digest: String) -> Self {
+        Self {
+            present_at_ns,
+            content_time_ns: frame.content_time.as_ns(),
+            key: frame.key,
+            phase: frame.phase.as_f64(),
+            kind: frame.kind,
+            digest,
+        }
+    }
+}
+
+impl Replayed {
+    fn to_text(&self) -> String {
+        let mut text =
+            String::from("present ms      content ms    key  phase  kind         digest\n");
+        for frame in &self.frames {
+            let kind = match frame.kind {
+                OutputKind::Real => "real",
+                OutputKind::Synthesised => "synthesised",
+                OutputKind::Repeated => "repeated",
+            };
+            let present_ms = MonoSpan::from_ns(frame.present_at_ns).as_ms_f64();
+            let content_ms = frame.content_time_ns as f64 / 1e6;
+            let ReplayedFrame { key, phase, digest, .. } = frame;
+            let _infallible = writeln!(
+                text,
+                "{present_ms:10.3} {content_ms:15.3} {key:6} {phase:6.3}  {kind:<12} {digest}"
+            );
+        }
+        let Self { digest, method, keys, refused, dropped, .. } = self;
+        let _infallible = writeln!(
+            text,
+            "{} output frames of {method} from {keys} keys ({refused} refused), {dropped} \
+             dropped\n{digest}",
+            self.frames.len()
+        );
+        text
+    }
 }

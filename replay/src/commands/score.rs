@@ -1,15 +1,109 @@
-//! `foreframe score`.
+//! `foreframe score`: how good each method's in-between frames are, on captures of a high rate.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use anyhow::{Context as _, ensure};
+use foreframe_engine::Method;
+use foreframed::clock;
+use foreframed::config::Backend;
 
 use crate::output::Output;
+use crate::recording::Recording as _;
+use crate::recording::capture::CaptureRecording;
+use crate::score::report::Report;
+use crate::score::run::{ScoreOptions, score_recording};
 
 /// Arguments of `foreframe score`.
 #[derive(clap::Args, Debug)]
-pub struct Args {}
+pub struct Args {
+    /// Captures whose every frame is a picture of the application.
+    #[arg(required = true, value_name = "FILE.mcap")]
+    pub captures: Vec<PathBuf>,
+    /// Take every N-th frame as a key, from frame 0, and predict the others.
+    #[arg(long, value_name = "N")]
+    pub ratio: NonZeroUsize,
+    /// Methods to compare: names with commas between, or all.
+    #[arg(long, value_name = "A,B", default_value = "all")]
+    pub methods: String,
+    /// What the engine runs on.
+    #[arg(long, value_enum, default_value_t = Backend::Auto)]
+    pub backend: Backend,
+    /// Threads of the engine [default: as many as there are processors]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+}
 
-/// Runs the command.
+/// Scores each capture and prints a table, or JSON.
 ///
 /// # Errors
-/// Always, until it exists.
-pub fn run(_args: &Args, _output: &Output) -> anyhow::Result<()> {
-    anyhow::bail!("score does not exist yet")
+/// If a capture cannot be read, or a method does not exist.
+pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
+    ensure!(args.ratio.get() > 1, "--ratio: expected 2 or more, found 1: nothing to predict");
+    let options = ScoreOptions {
+        methods: parse_methods(&args.methods)?,
+        ratio: args.ratio,
+        threads: args.threads.unwrap_or_else(all_processors),
+        timer: clock::now,
+    };
+    let mut recordings = Vec::new();
+    for path in &args.captures {
+        let recording = CaptureRecording::open(path)?;
+        for warning in recording.warnings()? {
+            eprintln!("foreframe: {}: {warning}", path.display());
+        }
+        recordings.push((path, recording));
+    }
+    let keys = |frames: usize| frames.div_ceil(args.ratio.get()) as u64;
+    let steps = recordings.iter().map(|(_, recording)| keys(recording.heads().len())).sum();
+    let progress = output.progress("scoring", steps);
+    let mut scores = Vec::new();
+    for (path, recording) in &mut recordings {
+        let name = recording.name().to_owned();
+        progress.set_message(format!("scoring {name}"));
+        let score = score_recording(&name, recording, &options, || progress.inc(1))
+            .with_context(|| format!("scoring {}", path.display()))?;
+        scores.push(score);
+    }
+    progress.finish_and_clear();
+    let report = Report::new("cpu", options.threads.get(), scores);
+    output.result(&report, &report.to_text())
+}
+
+/// As many threads as there are processors, one where the system does not say.
+pub(crate) fn all_processors() -> NonZeroUsize {
+    std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN)
+}
+
+/// Methods by name, each once, in the order of the list; `all` for every one.
+fn parse_methods(list: &str) -> anyhow::Result<Vec<Method>> {
+    if list == "all" {
+        return Ok(Method::ALL.to_vec());
+    }
+    let mut methods = Vec::new();
+    for name in list.split(',') {
+        let method = name.trim().parse().context("--methods")?;
+        if !methods.contains(&method) {
+            methods.push(method);
+        }
+    }
+    Ok(methods)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn methods_are_taken_once_each_in_the_order_given() {
+        let methods = parse_methods("linear, hold,linear").unwrap();
+        assert_eq!(methods, [Method::Linear, Method::Hold]);
+        assert_eq!(parse_methods("all").unwrap(), Method::ALL);
+    }
+
+    #[test]
+    fn an_unknown_method_says_which_there_are() {
+        let error = format!("{:#}", parse_methods("hold,voxels").unwrap_err());
+        assert!(error.contains("hold, blend") && error.contains("`voxels`"), "{error}");
+    }
 }

@@ -165,12 +165,10 @@ impl<'a> Sequence<'a> {
             found.0,
             found.1
         );
-        let frame = match &sidecar.foreframe {
+        match &sidecar.foreframe {
             Some(exported) => self.exported_frame(sidecar, exported),
             None => self.rendered_frame(sidecar),
-        }?;
-        frame.submit.validate()?;
-        Ok(frame)
+        }
     }
 
     /// A frame that [`super::export`] wrote.
@@ -304,7 +302,7 @@ impl<'a> Sequence<'a> {
         let earlier = self.sidecars.values().find(|earlier| {
             motion_from_ns.is_some_and(|time| ORIGIN_NS + earlier.time_ns() == time)
         });
-        Ok(Submit {
+        let submit = Submit {
             stream: STREAM,
             slot: 0,
             key_index: sidecar.frame,
@@ -314,7 +312,9 @@ impl<'a> Sequence<'a> {
             planes: descriptors,
             camera: sidecar.camera()?,
             motion_from_camera: earlier.map(Sidecar::camera).transpose()?.flatten(),
-        })
+        };
+        submit.validate()?;
+        Ok(submit)
     }
 }
 

@@ -6,6 +6,7 @@
 //! [`plan`] divides a recording into keys and frames to predict; [`compose`] finds a key's motion
 //! where the recording has none of that step.
 
+pub mod capture;
 pub mod compose;
 pub mod keys;
 #[cfg(test)]

@@ -4,7 +4,8 @@
 //! predicted. A key inherits the cut flag of any frame since the last key. Frames from a cut to the
 //! next key are left out: no method can know of them. Motion from one key to the next is the
 //! recording's own where it has that step, else it is composed from the fields of the frames
-//! between, and a cut key has none.
+//! between, and a cut key has none. Where every frame is a key, each keeps the motion that was
+//! recorded with it, whose span says by itself when a key before it was lost.
 
 use std::num::NonZeroUsize;
 use std::ops::Range;
@@ -64,6 +65,7 @@ impl Plan {
             let is_cut = heads[since..=frame].iter().any(|head| head.is_cut);
             let motion = match frame.checked_sub(ratio.get()) {
                 _ if is_cut => MotionSource::None,
+                _ if ratio.get() == 1 => as_recorded(&heads[frame]),
                 Some(previous) => motion_between(heads, previous, frame),
                 None => first_motion(heads, ratio),
             };
@@ -102,6 +104,10 @@ fn is_same_time(a: MonoTime, b: MonoTime) -> bool {
 /// The motion plane of `head` that points back to `from`.
 fn plane_from(head: &FrameHead, from: MonoTime) -> Option<usize> {
     head.motions.iter().position(|motion_from| is_same_time(*motion_from, from))
+}
+
+fn as_recorded(head: &FrameHead) -> MotionSource {
+    if head.motions.is_empty() { MotionSource::None } else { MotionSource::Own { plane: 0 } }
 }
 
 fn motion_between(heads: &[FrameHead], previous: usize, key: usize) -> MotionSource {
@@ -245,5 +251,13 @@ mod tests {
         assert_eq!(frames(&plan), [0, 1, 2]);
         assert_eq!(plan.keys.iter().map(|k| k.is_cut).collect::<Vec<_>>(), [false, true, false]);
         assert_eq!(plan.keys[2].motion, MotionSource::Own { plane: 0 });
+    }
+
+    #[test]
+    fn a_key_after_a_lost_one_keeps_its_motion_where_every_frame_is_a_key() {
+        let mut frames = heads(4, |_| vec![1], &[]);
+        frames.remove(2);
+        assert_eq!(plan(&frames, 1).keys[2].motion, MotionSource::Own { plane: 0 });
+        assert_eq!(plan(&frames, 2).keys[1].motion, MotionSource::None, "its step is unknown");
     }
 }

@@ -175,3 +175,12 @@ fn a_recording_of_one_frame_has_keys_but_no_values() {
     assert_eq!((capture.keys, capture.methods[0].frames), (1, 0));
     assert_eq!(capture.methods[0].psnr_rgb_db, None);
 }
+#[test]
+fn exact_motion_of_whole_pixels_is_predicted_to_the_bit() {
+    let mut recording = MemoryRecording::moving_patch(9, STEP, &[4]);
+    let linear = &score(&mut recording, &[Method::Linear]).methods[0];
+    assert_near(linear.psnr_rgb_db, 100.0);
+    assert_near(linear.error_flicker, 0.0);
+    assert_near(linear.worst_tile_psnr_db, 50.0);
+    assert_near(linear.flip, 0.0);
+}

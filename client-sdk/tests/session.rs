@@ -1,8 +1,10 @@
 //! What an application meets while the daemon works, lags, errs and dies.
 
+mod fake_daemon;
+
 use std::time::Duration;
 
-use crate::fake_daemon::{PATIENCE, connect};
+use fake_daemon::{PATIENCE, connect};
 use foreframe_client::{
     ConnectOptions, Error, Event, Key, PlaneKind, ReleaseReason, StreamOptions, StreamState,
 };

@@ -1,0 +1,198 @@
+//! A capture file as a [`Recording`]: one stream of it, planes read when they are asked for.
+//!
+//! Frames become key frames of the engine through the daemon's own translation, so that what is
+//! replayed or scored is what the daemon would have been given.
+
+use std::fs::File;
+use std::path::Path;
+
+use anyhow::Context as _;
+use foreframe_engine::{KeyInput, MonoTime, PlaneInput, StreamFormat};
+use foreframe_protocol::{PlaneDescriptor, PlaneKind, Submit};
+use foreframed::capture::{Capture, CapturedPlane, PlaneInfo, ReadAt};
+use foreframed::ingest;
+
+use super::{Frame, FrameHead, OwnedPlane, Recording, Wanted};
+
+/// The first stream of a capture that has frames.
+#[derive(Debug)]
+pub struct CaptureRecording<S = File> {
+    capture: Capture<S>,
+    stream: usize,
+    format: StreamFormat,
+    heads: Vec<FrameHead>,
+    /// Number in the file and motion planes of each frame.
+    places: Vec<Place>,
+}
+
+#[derive(Clone, Debug)]
+struct Place {
+    number: usize,
+    /// Planes of [`FrameHead::motions`], in that order.
+    motions: Vec<PlaneInfo>,
+}
+
+impl CaptureRecording {
+    /// Opens the file at `path` and reads what its frames have, without their pixels.
+    ///
+    /// # Errors
+    /// If it is no capture that can be read.
+    pub fn open(path: &Path) -> anyhow::Result<Self> {
+        let name = path.display();
+        let capture = Capture::open(path).with_context(|| format!("opening {name}"))?;
+        Self::new(capture).with_context(|| format!("reading {name}"))
+    }
+}
+
+impl<S: ReadAt> CaptureRecording<S> {
+    /// Reads what the frames of an open capture have.
+    ///
+    /// # Errors
+    /// If a frame's record cannot be read.
+    pub fn new(capture: Capture<S>) -> anyhow::Result<Self> {
+        let stream = capture.times().next().map_or(0, |first| first.stream);
+        let (mut heads, mut places) = (Vec::new(), Vec::new());
+        for (number, times) in capture.times().enumerate().filter(|(_, t)| t.stream == stream) {
+            let (submit, planes) = capture.describe(number)?;
+            let motions: Vec<_> = planes
+                .into_iter()
+                .filter(|info| info.kind == PlaneKind::Motion && info.motion_from_ns.is_some())
+                .collect();
+            let from = |info: &PlaneInfo| info.motion_from_ns.map(MonoTime::from_ns);
+            heads.push(FrameHead {
+                content_time: MonoTime::from_ns(times.content_time_ns),
+                arrived_at: MonoTime::from_ns(times.arrived_at_ns),
+                is_cut: submit.is_cut,
+                motions: motions.iter().filter_map(from).collect(),
+            });
+            places.push(Place { number, motions });
+        }
+        let format = ingest::stream_format(&capture.streams()[stream].format);
+        Ok(Self { capture, stream, format, heads, places })
+    }
+
+    /// What was recorded.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.capture.session().name
+    }
+
+    /// What a user should know about the file before trusting a result: one line each.
+    ///
+    /// # Errors
+    /// If the first frame's record cannot be read.
+    pub fn warnings(&self) -> anyhow::Result<Vec<String>> {
+        let info = self.capture.info()?;
+        let mut warnings = Vec::new();
+        if let Some(tail) = &info.tail {
+            warnings.push(format!("the file ends early, its last whole frame is used: {tail}"));
+        }
+        warnings.extend(info.damaged.iter().map(|damage| format!("a part is skipped: {damage}")));
+        if info.gaps > 0 {
+            warnings.push(format!("{} frames arrived and were not recorded", info.gaps));
+        }
+        if info.streams.len() > 1 {
+            let (used, all) = (self.stream + 1, info.streams.len());
+            warnings.push(format!("only stream {used} of {all} is used"));
+        }
+        Ok(warnings)
+    }
+
+    /// Camera of the frame that shows this content time.
+    fn camera_at(
+        &self,
+        content_time: MonoTime,
+    ) -> anyhow::Result<Option<foreframe_protocol::Camera>> {
+        let Some(frame) = self.heads.iter().position(|head| head.content_time == content_time)
+        else {
+            return Ok(None);
+        };
+        Ok(self.capture.submit(self.places[frame].number)?.camera)
+    }
+}
+
+impl<S: ReadAt> Recording for CaptureRecording<S> {
+    fn format(&self) -> &StreamFormat {
+        &self.format
+    }
+
+    fn heads(&self) -> &[FrameHead] {
+        &self.heads
+    }
+
+    fn read(&mut self, frame: usize, wanted: Wanted) -> anyhow::Result<Frame> {
+        let place = &self.places[frame];
+        let motion = match wanted {
+            Wanted::Key { motion: Some(plane) } => Some(place.motions[plane]),
+            Wanted::Key { motion: None } | Wanted::Color => None,
+        };
+        let is_wanted = |info: &PlaneInfo| match info.kind {
+            PlaneKind::Color => true,
+            PlaneKind::Depth => wanted != Wanted::Color,
+            PlaneKind::Motion => motion == Some(*info),
+            PlaneKind::Ui | PlaneKind::Mask => false,
+        };
+        let captured = self.capture.frame_with(place.number, is_wanted)?;
+        let mut submit = captured.submit;
+        self.describe_motion(&mut submit, motion)?;
+        for &kind in PlaneKind::ALL {
+            if captured.plane(kind).is_none() {
+                submit.planes.set(kind, None);
+            }
+        }
+        let format = &self.capture.streams()[self.stream].format;
+        let bytes = |kind| captured.plane(kind).map(|plane: &CapturedPlane| &plane.bytes[..]);
+        Ok(owned(&ingest::key_input(format, &submit, bytes)?))
+    }
+}
+
+impl<S: ReadAt> CaptureRecording<S> {
+    /// Makes `submit` speak of one of the frame's motion planes, or of none. The message as it
+    /// was recorded describes the first.
+    fn describe_motion(
+        &self,
+        submit: &mut Submit,
+        motion: Option<PlaneInfo>,
+    ) -> anyhow::Result<()> {
+        let motion_from_ns = motion.and_then(|info| info.motion_from_ns);
+        if motion_from_ns != submit.motion_from_ns {
+            submit.motion_from_ns = motion_from_ns;
+            submit.motion_from_camera = match motion_from_ns {
+                Some(from) => self.camera_at(MonoTime::from_ns(from))?,
+                None => None,
+            };
+        }
+        let descriptor = motion.map(|info| PlaneDescriptor {
+            offset: 0,
+            width: info.width,
+            height: info.height,
+            stride: 0,
+            valid: info.valid,
+            jitter: info.jitter,
+        });
+        submit.planes.set(PlaneKind::Motion, descriptor);
+        Ok(())
+    }
+}
+
+fn owned(input: &KeyInput<'_>) -> Frame {
+    let plane = |plane: PlaneInput<'_>| OwnedPlane {
+        bytes: plane.bytes.to_vec(),
+        width: plane.width,
+        height: plane.height,
+        stride: plane.stride,
+        valid: plane.valid,
+        jitter: plane.jitter,
+    };
+    Frame {
+        index: input.index,
+        content_time: input.content_time,
+        motion_from: input.motion_from,
+        is_cut: input.is_cut,
+        color: plane(input.color),
+        depth: input.depth.map(plane),
+        motion: input.motion.map(plane),
+        camera: input.camera,
+        motion_from_camera: input.motion_from_camera,
+    }
+}

@@ -1,0 +1,89 @@
+//! When the keys of a recording arrive on the virtual clock.
+
+use foreframe_engine::MonoTime;
+
+use super::TimedKey;
+use crate::recording::keys::KeyReader;
+use crate::recording::plan::Plan;
+use crate::recording::{FrameHead, Recording};
+
+/// What decides when a key arrives.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum KeyTiming {
+    /// The recorded arrival, with all its jitter.
+    AsRecorded,
+    /// Content time: the first key as recorded, the others after it by what lies between their
+    /// content times.
+    Stepped,
+}
+
+/// When the keys of `plan` arrive, in order; never earlier than the key before.
+#[must_use]
+pub fn arrivals(heads: &[FrameHead], plan: &Plan, timing: KeyTiming) -> Vec<MonoTime> {
+    let keys = plan.keys.iter().map(|key| &heads[key.frame]);
+    let Some(first) = keys.clone().next() else { return Vec::new() };
+    let mut latest = MonoTime::ZERO;
+    keys.map(|head| {
+        let arrives_at = match timing {
+            KeyTiming::AsRecorded => head.arrived_at,
+            KeyTiming::Stepped => first.arrived_at + (head.content_time - first.content_time),
+        };
+        latest = latest.max(arrives_at);
+        latest
+    })
+    .collect()
+}
+
+/// The keys of `plan` with their arrivals, read one by one.
+pub fn timed_keys<'a>(
+    recording: &'a mut dyn Recording,
+    reader: &'a KeyReader,
+    plan: &'a Plan,
+    timing: KeyTiming,
+) -> impl Iterator<Item = anyhow::Result<TimedKey>> + 'a {
+    let arrivals = arrivals(recording.heads(), plan, timing);
+    arrivals.into_iter().enumerate().map(move |(key, arrives_at)| {
+        Ok(TimedKey { arrives_at, frame: reader.read(recording, plan, key)? })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::num::NonZeroUsize;
+
+    use foreframe_engine::MonoSpan;
+
+    use super::*;
+
+    fn at_ms(ms: i64) -> MonoTime {
+        MonoTime::ZERO + MonoSpan::from_ms(ms)
+    }
+
+    fn plan_of(times: &[(i64, i64)]) -> (Vec<FrameHead>, Plan) {
+        let head = |(content, arrived): &(i64, i64)| FrameHead {
+            content_time: at_ms(*content),
+            arrived_at: at_ms(*arrived),
+            is_cut: false,
+            motions: Vec::new(),
+        };
+        let heads: Vec<_> = times.iter().map(head).collect();
+        let plan = Plan::new(&heads, NonZeroUsize::MIN);
+        (heads, plan)
+    }
+
+    #[test]
+    fn as_recorded_keeps_the_jitter_and_stepped_takes_it_out() {
+        let (heads, plan) = plan_of(&[(0, 100), (25, 131), (50, 149)]);
+        let recorded = arrivals(&heads, &plan, KeyTiming::AsRecorded);
+        assert_eq!(recorded, [100, 131, 149].map(at_ms));
+        let stepped = arrivals(&heads, &plan, KeyTiming::Stepped);
+        assert_eq!(stepped, [100, 125, 150].map(at_ms));
+    }
+
+    #[test]
+    fn no_key_arrives_before_the_one_before_it() {
+        let (heads, plan) = plan_of(&[(50, 100), (0, 90), (25, 120)]);
+        assert_eq!(arrivals(&heads, &plan, KeyTiming::AsRecorded), [100, 100, 120].map(at_ms));
+        assert_eq!(arrivals(&heads, &plan, KeyTiming::Stepped), [100, 100, 100].map(at_ms));
+    }
+}

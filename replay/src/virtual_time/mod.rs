@@ -1,0 +1,186 @@
+//! A daemon's stream without a daemon: keys of a recording in, output frames out, on virtual time.
+//!
+//! The very [`StreamCore`] that the daemon runs is driven here by a clock that is set, not read:
+//! it jumps from event to event, making a frame takes a constant time, and the display refreshes
+//! exactly on its grid. So one recording gives one sequence of plans and, for any number of
+//! threads, one sequence of pictures, whose [`digest`] proves it.
+
+pub mod digest;
+pub mod keys;
+
+use foreframe_engine::{ColorPlane, EngineConfig, Method, MonoSpan, MonoTime, Phase, StreamFormat};
+use foreframed::stream::core::{CoreConfig, FrameKind, FrameOutcome, PresentedFrame, StreamCore};
+use std::num::NonZeroUsize;
+
+use crate::recording::Frame;
+
+/// Time that making a frame takes, unless a quarter of the refresh interval is less.
+const MAX_WORK: MonoSpan = MonoSpan::from_ms(1);
+
+/// How to replay.
+#[derive(Clone, Copy, Debug)]
+pub struct ReplayConfig {
+    /// How in-between frames are made.
+    pub method: Method,
+    /// Threads of the engine. The pictures do not depend on it.
+    pub threads: NonZeroUsize,
+    /// Period of the display.
+    pub refresh_interval: MonoSpan,
+}
+
+/// Where an output frame comes from.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum OutputKind {
+    /// A key, as it is.
+    Real,
+    /// Made by the engine.
+    Synthesised,
+    /// The frame before, again.
+    Repeated,
+}
+
+/// One refresh of the display.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct OutputFrame {
+    /// Number of the refresh, from 0 at the first picture.
+    pub index: u64,
+    /// When it is shown.
+    pub present_at: MonoTime,
+    /// Content time that it shows.
+    pub content_time: MonoTime,
+    /// Number of the newest key that it was made from.
+    pub key: u64,
+    /// Position after that key.
+    pub phase: Phase,
+    /// Where it comes from.
+    pub kind: OutputKind,
+}
+
+/// What did not become an output frame.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct Losses {
+    /// Pictures that were not ready for their refresh.
+    pub dropped: u64,
+    /// Why each refused key was refused, in order.
+    pub refused: Vec<String>,
+}
+
+/// A key and when it arrives.
+#[derive(Clone, Debug)]
+pub struct TimedKey {
+    /// On the virtual clock; not before the key before.
+    pub arrives_at: MonoTime,
+    /// The key.
+    pub frame: Frame,
+}
+
+/// Replays `keys` and hands each output frame to `show`. Ends one key interval after the last key,
+/// and not before a picture was shown.
+///
+/// # Errors
+/// Those of `keys` and of `show`.
+pub fn replay(
+    format: StreamFormat,
+    config: &ReplayConfig,
+    keys: impl IntoIterator<Item = anyhow::Result<TimedKey>>,
+    mut show: impl FnMut(&OutputFrame, &ColorPlane) -> anyhow::Result<()>,
+) -> anyhow::Result<Losses> {
+    let mut losses = Losses::default();
+    let mut keys = keys.into_iter();
+    let Some(first) = keys.next().transpose()? else { return Ok(losses) };
+    let mut clock = first.arrives_at;
+    let mut stream = VirtualStream::new(format, config, clock);
+    let mut next = Some(first);
+    let mut last_arrivals = [clock; 2];
+    loop {
+        let plan = stream.core.plan(clock);
+        if let Some(key) =
+            next.take_if(|key| plan.content_time.is_none() || key.arrives_at <= plan.wake_at)
+        {
+            clock = clock.max(key.arrives_at);
+            last_arrivals = [last_arrivals[1], key.arrives_at];
+            if let Err(error) = stream.core.on_key(&key.frame.as_input(), key.arrives_at) {
+                losses.refused.push(format!("key {}: {error}", key.frame.index));
+            }
+            next = keys.next().transpose()?;
+            continue;
+        }
+        let interval = (last_arrivals[1] - last_arrivals[0]).max(config.refresh_interval);
+        let is_over = next.is_none() && plan.present_at > last_arrivals[1] + interval;
+        if plan.content_time.is_none() || (is_over && stream.shown.is_some()) {
+            return Ok(losses);
+        }
+        clock = plan.wake_at + stream.work;
+        match stream.core.make(&plan, || clock) {
+            Some(FrameOutcome::Presented(frame)) => {
+                let frame = stream.present(&frame);
+                show(&frame, stream.core.frame())?;
+            }
+            Some(FrameOutcome::Repeated) => {
+                if let Some(frame) = stream.repeat(plan.present_at) {
+                    show(&frame, stream.core.frame())?;
+                }
+            }
+            Some(FrameOutcome::Dropped) | None => losses.dropped += 1,
+        }
+    }
+}
+
+/// The stream and what its display shows.
+struct VirtualStream {
+    core: StreamCore,
+    work: MonoSpan,
+    refresh_interval: MonoSpan,
+    shown: Option<OutputFrame>,
+}
+
+impl VirtualStream {
+    fn new(format: StreamFormat, config: &ReplayConfig, origin: MonoTime) -> Self {
+        let refresh_interval = config.refresh_interval;
+        let core = StreamCore::new(
+            format,
+            &CoreConfig {
+                engine: EngineConfig {
+                    method: config.method,
+                    threads: config.threads,
+                    pixels_per_degree: None,
+                    timer: || MonoTime::ZERO,
+                },
+                refresh_interval,
+                display_origin: origin,
+            },
+        );
+        let work = MAX_WORK.min(refresh_interval.scale(1, 4));
+        Self { core, work, refresh_interval, shown: None }
+    }
+
+    fn present(&mut self, frame: &PresentedFrame) -> OutputFrame {
+        let kind = match frame.kind {
+            FrameKind::Real => OutputKind::Real,
+            FrameKind::Synthesised => OutputKind::Synthesised,
+        };
+        *self.shown.insert(OutputFrame {
+            index: frame.index,
+            present_at: frame.presented_at,
+            content_time: frame.content_time,
+            key: frame.key_index,
+            phase: frame.phase,
+            kind,
+        })
+    }
+
+    /// The picture on the display at a later refresh.
+    fn repeat(&mut self, present_at: MonoTime) -> Option<OutputFrame> {
+        let shown = self.shown.as_mut()?;
+        let interval = self.refresh_interval.as_ns().max(1);
+        let passed = ((present_at - shown.present_at).as_ns() + interval / 2) / interval;
+        shown.index += passed.max(0).unsigned_abs();
+        shown.present_at = present_at;
+        shown.kind = OutputKind::Repeated;
+        Some(*shown)
+    }
+}
+
+#[cfg(test)]
+mod tests;
