@@ -1,6 +1,6 @@
 //! Prints milliseconds per key and per in-between frame, by method and size.
 //!
-//! Usage: `cargo run --release -p foreframe-engine --example time_methods [-- THREADS]`
+//! Usage: `cargo run --release -p foreframe-engine --example time_methods [-- THREADS [METHOD]]`
 //!
 //! Colour rgba8, depth f32 and motion rg16f at half resolution. The scene is a slanted ground that
 //! the camera moves over and a grid of nearer tiles that move across it: everything moves by
@@ -129,10 +129,13 @@ fn main() {
     let threads = threads.unwrap_or(NonZeroUsize::MIN.saturating_add(1));
     println!("threads {threads}; median and minimum");
     println!("{:10} {:14} {:>13} {:>13}", "size", "method", "ms/key", "ms/frame");
+    let only = std::env::args().nth(2);
     for (width, height) in [(1280, 720), (1920, 1080)] {
-        for (method, still) in
-            Method::ALL.map(|method| (method, false)).into_iter().chain([(Method::Linear, true)])
-        {
+        let cases = Method::ALL.map(|method| (method, false));
+        for (method, still) in cases.into_iter().chain([(Method::Linear, true)]) {
+            if only.as_ref().is_some_and(|only| only != method.name()) {
+                continue;
+            }
             let [key, frame] = time(width, height, method, threads, still);
             let name = format!("{}{}", method.name(), if still { " (still)" } else { "" });
             let size = format!("{width}x{height}");

@@ -6,9 +6,12 @@
 //! monotone, and weight 0 gives back the very bits that came in.
 
 #[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
 mod sse2;
 
-use crate::plane::Plane;
+use crate::plane::{Plane, Rect};
+use crate::warp::sample::sample;
 
 /// How the channels of a colour plane are stored.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -66,6 +69,13 @@ pub trait Texel: Copy + Default + PartialEq + Send + Sync + 'static {
     /// `(a * (256 - weight) + b * weight + 128) >> 8` per channel; `weight` is 0 to 256.
     #[must_use]
     fn mix(a: Self, b: Self, weight: u32) -> Self;
+
+    /// [`sample`] at each of the Q8 positions `xs`, `ys` into `out`, all of the same length.
+    fn sample_each(plane: &Plane<Self>, valid: Rect, xs: &[i32], ys: &[i32], out: &mut [Self]) {
+        for (texel, (&x, &y)) in out.iter_mut().zip(xs.iter().zip(ys)) {
+            *texel = sample(plane, valid, x, y);
+        }
+    }
 }
 
 fn bilinear_weights(fx: u32, fy: u32) -> [u32; 4] {
@@ -121,6 +131,24 @@ impl Texel for Rgba8 {
 
     fn mix(a: Self, b: Self, weight: u32) -> Self {
         Self(packed_channels([a.0, b.0], RGBA8_FIELDS, |c| mix_channel(c, weight)))
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    fn sample_each(plane: &Plane<Self>, valid: Rect, xs: &[i32], ys: &[i32], out: &mut [Self]) {
+        let (out, rest) = if is_x86_feature_detected!("avx2") {
+            let ((xs, _), (ys, _)) = (xs.as_chunks(), ys.as_chunks());
+            let (eights, rest) = out.as_chunks_mut();
+            for (out, (xs, ys)) in eights.iter_mut().zip(xs.iter().zip(ys)) {
+                // SAFETY: the processor has AVX2, asked for just above.
+                unsafe { avx2::sample_eight(plane, valid, xs, ys, out) };
+            }
+            (eights.len() * avx2::LANES, rest)
+        } else {
+            (0, out)
+        };
+        for (texel, (&x, &y)) in rest.iter_mut().zip(xs[out..].iter().zip(&ys[out..])) {
+            *texel = sample(plane, valid, x, y);
+        }
     }
 }
 
@@ -277,6 +305,27 @@ mod tests {
                 Rgba8::bilinear(corners, fx, fy),
                 Rgba8::bilinear_by_channel(corners, fx, fy)
             );
+        }
+
+        #[test]
+        fn sampling_each_of_many_equals_sampling_one_by_one(
+            (width, height) in (1_u32..20, 1_u32..20),
+            (left, top) in (0_u32..4, 0_u32..4),
+            positions in proptest::collection::vec((-900..6000_i32, -900..6000_i32), 0..30),
+            seed: u32,
+        ) {
+            let ColorPlane::Rgba8(plane) =
+                crate::testing::noise(ColorFormat::Rgba8, width + left + 1, height + top, seed)
+            else {
+                unreachable!("the format asked for")
+            };
+            let valid = Rect { x: left, y: top, width, height };
+            let (xs, ys): (Vec<i32>, Vec<i32>) = positions.iter().copied().unzip();
+            let mut out = vec![Rgba8::default(); xs.len()];
+            Rgba8::sample_each(&plane, valid, &xs, &ys, &mut out);
+            for ((x, y), texel) in positions.into_iter().zip(out) {
+                prop_assert_eq!(texel, sample(&plane, valid, x, y), "at {}, {}", x, y);
+            }
         }
 
         #[test]

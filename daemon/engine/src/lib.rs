@@ -18,6 +18,7 @@ pub mod engine;
 pub mod field;
 pub mod fill;
 pub mod format;
+pub mod kernels;
 pub mod key;
 pub mod method;
 pub mod pacing;

@@ -58,9 +58,18 @@ pub fn far_side(
                     first: vertical(above.at(hole, y)),
                     second: vertical(below.at(hole, y)),
                 };
-                let sides = if stacked.run() < beside.run() { stacked } else { beside };
-                let depth = |cell: u32| source.depth.data()[source_of(splat.data()[cell as usize])];
-                row[hole as usize] = sides.farther(depth);
+                let (sides, others) = if stacked.run() < beside.run() {
+                    (stacked, beside)
+                } else {
+                    (beside, stacked)
+                };
+                let depth =
+                    |side: Side| source.depth.data()[source_of(splat.data()[side.cell as usize])];
+                let mut far = sides.farther(depth);
+                if sides.is_open() {
+                    far = farther(far, others.farther(depth), depth);
+                }
+                row[hole as usize] = far.map_or(NO_CELL, |side| side.cell);
             }
             x = end;
         }
@@ -110,18 +119,24 @@ impl Sides {
         }
     }
 
-    /// (3).
-    fn farther(&self, depth: impl Fn(u32) -> u32) -> u32 {
-        let (Some(first), Some(second)) = (self.first, self.second) else {
-            return self.first.or(self.second).map_or(NO_CELL, |side| side.cell);
-        };
-        let (a, b) = (depth(first.cell), depth(second.cell));
-        if a < b - (b >> 8) {
-            first.cell
-        } else if b < a - (a >> 8) || second.way < first.way {
-            second.cell
-        } else {
-            first.cell
-        }
+    /// Whether the hole reaches the border of the image on one of them.
+    fn is_open(&self) -> bool {
+        self.first.is_none() || self.second.is_none()
     }
+
+    /// (3) along this axis.
+    fn farther(&self, depth: impl Fn(Side) -> u32) -> Option<Side> {
+        farther(self.first, self.second, depth)
+    }
+}
+
+/// (3) of two sides.
+fn farther(first: Option<Side>, second: Option<Side>, depth: impl Fn(Side) -> u32) -> Option<Side> {
+    let Some((first, second)) = first.zip(second) else {
+        return first.or(second);
+    };
+    let (a, b) = (depth(first), depth(second));
+    let takes_second =
+        if a < b - (b >> 8) { false } else { b < a - (a >> 8) || second.way < first.way };
+    Some(if takes_second { second } else { first })
 }

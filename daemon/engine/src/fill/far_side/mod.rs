@@ -10,11 +10,13 @@
 //!                 1/256 of each other, the nearer one, and the left or upper one among equals
 //! ```
 //!
-//! At the border of the image a side is missing, and the other one is taken: a run is then counted
-//! as twice the way to it. A grid without any resolved cell has no far side: [`NO_CELL`].
+//! At the border of the image a side is missing: a run is then counted as twice the way to the
+//! other one, and as what is missing may be the far one, the other axis takes part in (3). A grid without any resolved cell has no far side: [`NO_CELL`].
 //! Exactness: `Exact`.
 
 mod cpu;
+#[cfg(test)]
+mod tests;
 
 pub use cpu::{FarScratch, far_side};
 

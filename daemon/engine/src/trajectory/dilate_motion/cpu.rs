@@ -17,36 +17,72 @@ pub fn dilate_motion(
     velocity: &mut Plane<Velocity>,
 ) {
     velocity.resize(displacement.width(), displacement.height());
-    let has_depth = !depth.data().is_empty();
     #[expect(clippy::cast_possible_truncation, reason = "seconds need no more than an f32")]
     let px_per_span = params
         .pixels_per_degree
         .map(|pixels_per_degree| pixels_per_degree * params.span.as_secs_f64() as f32);
     for_each_row(pool, velocity, |y, row| {
-        for (x, velocity) in (0..).zip(row) {
-            let source = if has_depth { nearest_in_3x3(depth, x, y).0 } else { (x, y) };
-            *velocity = quantise(displacement.at(source.0, source.1), px_per_span);
+        for (velocity, &displacement) in row.iter_mut().zip(displacement.row(y)) {
+            *velocity = quantise(displacement, px_per_span);
         }
+        if depth.data().is_empty() {
+            return;
+        }
+        for_each_block(depth, y, |first, near| {
+            let centres = &depth.row(y)[first as usize..][..near.len()];
+            for (x, (&near, &centre)) in (first..).zip(near.iter().zip(centres)) {
+                if near != centre {
+                    let (column, row_of) = nearest_in_3x3(depth, x, y, near);
+                    row[x as usize] = quantise(displacement.at(column, row_of), px_per_span);
+                }
+            }
+        });
     });
 }
 
-/// (1) and (2): the column, row and depth key of the cell whose motion cell (`x`, `y`) takes.
-#[must_use]
-pub fn nearest_in_3x3(depth: &Plane<u32>, x: u32, y: u32) -> ((u32, u32), u32) {
-    let centre = depth.at(x, y);
+/// The depth keys of the surfaces that the cells of row `y` take their motion from, (2), into
+/// `dilated`.
+pub fn dilate_depth_row(depth: &Plane<u32>, y: u32, dilated: &mut [u32]) {
+    for_each_block(depth, y, |first, near| {
+        dilated[first as usize..][..near.len()].copy_from_slice(near);
+    });
+}
+
+/// Cells whose maxima are computed together.
+const BLOCK: usize = 64;
+
+/// Calls `block(first, keys)` with the depth keys of (2) for each run of cells of row `y`.
+fn for_each_block(depth: &Plane<u32>, y: u32, mut block: impl FnMut(u32, &[u32])) {
+    let (width, height) = (depth.width() as usize, depth.height());
+    let rows = [y.saturating_sub(1), y, (y + 1).min(height - 1)].map(|y| depth.row(y));
+    for first in (0..width).step_by(BLOCK) {
+        let end = (first + BLOCK).min(width);
+        // Largest of each column, with one more column on either side; 0 beyond the grid.
+        let mut columns = [0; BLOCK + 2];
+        let (from, to) = (first.saturating_sub(1), (end + 1).min(width));
+        let cells = rows[0][from..to].iter().zip(&rows[1][from..to]).zip(&rows[2][from..to]);
+        for (max, ((above, here), below)) in columns[from + 1 - first..].iter_mut().zip(cells) {
+            *max = (*above).max(*here).max(*below);
+        }
+        let mut near = [0; BLOCK];
+        for (i, (near, &centre)) in near.iter_mut().zip(&rows[1][first..end]).enumerate() {
+            let max = columns[i].max(columns[i + 1]).max(columns[i + 2]);
+            *near = if max - centre > max >> 8 { max } else { centre };
+        }
+        block(first as u32, &near[..end - first]);
+    }
+}
+
+/// (1): the first cell in reading order of the 3x3 around (`x`, `y`) that has depth key `max`,
+/// which one of them has.
+fn nearest_in_3x3(depth: &Plane<u32>, x: u32, y: u32, max: u32) -> (u32, u32) {
     let columns = x.saturating_sub(1)..=(x + 1).min(depth.width() - 1);
-    let rows = y.saturating_sub(1)..=(y + 1).min(depth.height() - 1);
-    let mut max = centre;
-    for row in rows.clone() {
-        let cells = &depth.row(row)[*columns.start() as usize..=*columns.end() as usize];
-        max = cells.iter().fold(max, |max, cell| max.max(*cell));
-    }
-    if max - centre <= max >> 8 {
-        return ((x, y), centre);
-    }
-    let mut cells = rows.flat_map(|row| columns.clone().map(move |column| (column, row)));
-    let nearest = cells.find(|(column, row)| depth.at(*column, *row) == max);
-    (nearest.expect("the maximum is one of the cells"), max)
+    let mut rows = y.saturating_sub(1)..=(y + 1).min(depth.height() - 1);
+    let found = rows.find_map(|row| {
+        let mut columns = columns.clone();
+        columns.find(|column| depth.at(*column, row) == max).map(|column| (column, row))
+    });
+    found.unwrap_or((x, y))
 }
 
 /// (3) and (4). `px_per_span` is pixels per span of a speed of one degree per second.

@@ -9,7 +9,6 @@ use crate::key::{KeyFrame, Velocity};
 use crate::phase::Phase;
 use crate::plane::{Plane, Rect};
 use crate::warp::displacement;
-use crate::warp::sample::sample;
 
 /// Warps `key` to `phase` into `out`, which has the key's size and format. `map` is the map of
 /// the key's field grid; the key has a velocity field.
@@ -44,17 +43,24 @@ fn warp<T: Texel>(pool: &ThreadPool, field: &Field<'_>, color: &Plane<T>, out: &
             return;
         }
         let columns = &mut row[valid.x as usize..][..valid.width as usize];
-        for (index, texel) in (0..).zip(columns) {
-            *texel = pixel(field, color, index, y - valid.y);
+        for (block, texels) in (0..).zip(columns.chunks_mut(BLOCK)) {
+            let (mut xs, mut ys) = ([0; BLOCK], [0; BLOCK]);
+            let (xs, ys) = (&mut xs[..texels.len()], &mut ys[..texels.len()]);
+            for (index, (x, y_from)) in (block * BLOCK as u32..).zip(xs.iter_mut().zip(&mut *ys)) {
+                [*x, *y_from] = position(field, index, y - valid.y);
+            }
+            T::sample_each(color, valid, xs, ys, texels);
         }
     });
 }
 
-/// (1) for the pixel `index_x`, `index_y` of the valid rectangle.
-fn pixel<T: Texel>(field: &Field<'_>, color: &Plane<T>, index_x: u32, index_y: u32) -> T {
+/// Pixels whose positions are computed before they are read.
+const BLOCK: usize = 64;
+
+/// Where (1) reads pixel `index_x`, `index_y` of the valid rectangle.
+fn position(field: &Field<'_>, index_x: u32, index_y: u32) -> [i32; 2] {
     let cell = (field.map.x.cell_of(index_x), field.map.y.cell_of(index_y));
     let [dx, dy] = displacement(field.velocity.at(cell.0, cell.1), field.phase);
     let x = ((field.valid.x + index_x) << 8).cast_signed() - dx;
-    let y = ((field.valid.y + index_y) << 8).cast_signed() - dy;
-    sample(color, field.valid, x, y)
+    [x, ((field.valid.y + index_y) << 8).cast_signed() - dy]
 }

@@ -73,69 +73,79 @@ fn gather<T: Texel>(pool: &ThreadPool, frame: &Frame<'_>, color: &Plane<T>, out:
 
 /// One row of the valid rectangle.
 fn gather_row<T: Texel>(frame: &Frame<'_>, color: &Plane<T>, index_y: u32, row: &mut [T]) {
-    let map = frame.map;
-    let class = frame.field.class.row(map.y.cell_of(index_y));
-    let mut columns = Columns::new(frame, index_y);
-    for (index_x, texel) in (0..).zip(row) {
-        let p = [frame.valid.x + index_x, frame.valid.y + index_y].map(|p| (p << 8).cast_signed());
-        *texel = match class[map.x.cell_of(index_x) as usize] {
-            CellClass::Smooth => {
-                let [dx, dy] = columns.displacement(index_x);
-                sample(color, frame.valid, p[0] - dx, p[1] - dy)
+    let class = frame.field.class.row(frame.map.y.cell_of(index_y));
+    let p_y = ((frame.valid.y + index_y) << 8).cast_signed();
+    let mut between = Between::new(frame, index_y);
+    for (block, texels) in (0..).zip(row.chunks_mut(BLOCK)) {
+        let first = block * BLOCK as u32;
+        let (mut xs, mut ys) = ([0; BLOCK], [p_y; BLOCK]);
+        let (xs, ys) = (&mut xs[..texels.len()], &mut ys[..texels.len()]);
+        between.positions(first, xs, ys);
+        T::sample_each(color, frame.valid, xs, ys, texels);
+        for (index_x, texel) in (first..).zip(texels) {
+            if class[frame.map.x.cell_of(index_x) as usize] == CellClass::Broken {
+                let p_x = ((frame.valid.x + index_x) << 8).cast_signed();
+                *texel = broken_pixel(frame, color, [index_x, index_y], [p_x, p_y]);
             }
-            CellClass::Broken => broken_pixel(frame, color, [index_x, index_y], p),
-        };
+        }
     }
 }
 
-/// Displacements of the two cell columns around a pixel, interpolated down to its row.
-struct Columns<'a> {
+/// Pixels whose positions are computed before they are read.
+const BLOCK: usize = 64;
+
+/// The velocities of the cells above and below a row of pixels.
+struct Between<'a> {
     frame: &'a Frame<'a>,
-    above: &'a [Velocity],
-    below: &'a [Velocity],
+    above: &'a [[i16; 2]],
+    below: &'a [[i16; 2]],
     way_y: i32,
-    /// The left column, and the displacements in it and in the next one.
-    left: u32,
-    pair: [[i32; 2]; 2],
+    /// Displacements of a block's cells, interpolated down to the row; one more than the block
+    /// can have cells, for the right neighbour of the last.
+    cells: [[i32; 2]; BLOCK + 2],
 }
 
-impl<'a> Columns<'a> {
+impl<'a> Between<'a> {
     fn new(frame: &'a Frame<'a>, index_y: u32) -> Self {
         let (y, way) = frame.map.y.before(index_y);
         let carried = &frame.field.carried;
-        let mut columns = Self {
+        Self {
             frame,
             above: carried.row(y),
             below: carried.row((y + 1).min(carried.height() - 1)),
             way_y: way.cast_signed(),
-            left: 0,
-            pair: [[0; 2]; 2],
-        };
-        columns.pair = [columns.column(0), columns.column(1)];
-        columns
-    }
-
-    fn column(&self, x: u32) -> [i32; 2] {
-        let x = (x as usize).min(self.above.len() - 1);
-        let above = displacement(self.above[x], self.frame.phase);
-        let below = displacement(self.below[x], self.frame.phase);
-        lerp(above, below, self.way_y)
-    }
-
-    /// (1) for the pixel `index_x`; to be asked for from left to right.
-    fn displacement(&mut self, index_x: u32) -> [i32; 2] {
-        let (left, way) = self.frame.map.x.before(index_x);
-        if left != self.left {
-            let next = if left == self.left + 1 { self.pair[1] } else { self.column(left) };
-            self.pair = [next, self.column(left + 1)];
-            self.left = left;
+            cells: [[0; 2]; BLOCK + 2],
         }
-        lerp(self.pair[0], self.pair[1], way.cast_signed())
+    }
+
+    /// (1): where the pixels from `first` on are read, x into `xs`; `ys` holds their own y and
+    /// becomes where they are read. In broken cells the result is not used.
+    fn positions(&mut self, first: u32, xs: &mut [i32], ys: &mut [i32]) {
+        let map = &self.frame.map.x;
+        let last = first + xs.len() as u32 - 1;
+        let (start, end) = (map.before(first).0 as usize, map.before(last).0 as usize + 1);
+        let end = end.min(self.above.len() - 1);
+        let phase = self.frame.phase.q12();
+        let (above, below) = (&self.above[start..=end], &self.below[start..=end]);
+        for (cell, (above, below)) in self.cells.iter_mut().zip(above.iter().zip(below)) {
+            let shift = |v: i16| (i32::from(v) * phase + 256) >> 9;
+            *cell = lerp(above.map(shift), below.map(shift), self.way_y);
+        }
+        self.cells[end - start + 1] = self.cells[end - start];
+        let places = (first..).zip(xs.iter_mut().zip(ys));
+        for (index, (x, y)) in places {
+            let (cell, way) = map.before(index);
+            let cell = cell as usize - start;
+            let [dx, dy] = lerp(self.cells[cell], self.cells[cell + 1], way.cast_signed());
+            *x = ((self.frame.valid.x + index) << 8).cast_signed() - dx;
+            *y -= dy;
+        }
     }
 }
 
-/// `a + ((b - a) way + 128) / 256`, rounded down. Displacements stay below 2^20, so nothing
+/// `a + ((b - a) way + 128) / 256`, rounded down. Displacements stay within 2^20, so nothing
 /// overflows; in a smooth cell they differ by half a pixel at most.
+#[inline]
 fn lerp(a: [i32; 2], b: [i32; 2], way: i32) -> [i32; 2] {
     [a[0] + (((b[0] - a[0]) * way + 128) >> 8), a[1] + (((b[1] - a[1]) * way + 128) >> 8)]
 }
@@ -167,7 +177,8 @@ fn broken_pixel<T: Texel>(frame: &Frame<'_>, color: &Plane<T>, index: [u32; 2], 
     let mut last = HOLE;
     for y in cell_y.saturating_sub(1)..=(cell_y + 1).min(carried.height() - 1) {
         for x in cell_x.saturating_sub(1)..=(cell_x + 1).min(carried.width() - 1) {
-            let velocity = carried.at(x, y);
+            let [vx, vy] = carried.at(x, y);
+            let velocity = Velocity { x: vx, y: vy };
             if velocity == HOLE || velocity == last {
                 continue;
             }

@@ -27,6 +27,8 @@
 mod cpu;
 mod fill;
 mod scratch;
+#[cfg(test)]
+mod tests;
 
 pub use cpu::warp_linear;
 pub use scratch::LinearScratch;

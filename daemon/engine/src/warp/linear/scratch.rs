@@ -4,7 +4,7 @@ use rayon::ThreadPool;
 
 use crate::field::FieldMap;
 use crate::fill::far_side::{FarScratch, far_side};
-use crate::key::{KeyFrame, Velocity};
+use crate::key::KeyFrame;
 use crate::phase::Phase;
 use crate::plane::Plane;
 use crate::warp::resolve::{CellClass, classify, resolve};
@@ -16,7 +16,8 @@ pub struct LinearScratch {
     /// The key's field, set by [`LinearScratch::take_key`].
     pub(super) source: SourceField,
     pub(super) splat: Plane<u32>,
-    pub(super) carried: Plane<Velocity>,
+    /// The velocity that each cell shows, x and y.
+    pub(super) carried: Plane<[i16; 2]>,
     pub(super) class: Plane<CellClass>,
     /// For each hole, the cell on its far side.
     pub(super) far: Plane<u32>,

@@ -4,7 +4,6 @@ use rayon::ThreadPool;
 
 use super::{CellClass, HOLE};
 use crate::bands::for_each_row;
-use crate::key::Velocity;
 use crate::phase::Phase;
 use crate::plane::Plane;
 use crate::warp::scatter::{NO_SOURCE, SourceField, source_of};
@@ -18,13 +17,14 @@ pub fn resolve(
     pool: &ThreadPool,
     source: &SourceField,
     splat: &Plane<u32>,
-    carried: &mut Plane<Velocity>,
+    carried: &mut Plane<[i16; 2]>,
 ) {
     carried.resize(splat.width(), splat.height());
     let velocities = source.velocity.data();
     for_each_row(pool, carried, |y, row| {
         for (velocity, &splat) in row.iter_mut().zip(splat.row(y)) {
-            *velocity = if splat == NO_SOURCE { HOLE } else { velocities[source_of(splat)] };
+            let shown = if splat == NO_SOURCE { HOLE } else { velocities[source_of(splat)] };
+            *velocity = [shown.x, shown.y];
         }
     });
 }
@@ -32,53 +32,56 @@ pub fn resolve(
 /// (2).
 pub fn classify(
     pool: &ThreadPool,
-    carried: &Plane<Velocity>,
+    carried: &Plane<[i16; 2]>,
     phase: Phase,
     class: &mut Plane<CellClass>,
 ) {
     let (width, height) = (carried.width(), carried.height());
     class.resize(width, height);
+    // ((range p) >> 9 <= SMOOTH_RANGE) for every range up to this one.
+    let limit = (((SMOOTH_RANGE + 1) << 9) - 1) / phase.q12().max(1);
+    let limit = u16::try_from(limit).unwrap_or(u16::MAX);
     for_each_row(pool, class, |y, row| {
         let rows = [y.saturating_sub(1), y, (y + 1).min(height - 1)].map(|y| carried.row(y));
-        let mut columns = [Range::of_column(&rows, 0); 3];
-        for (x, class) in row.iter_mut().enumerate() {
-            columns = [columns[1], columns[2], columns[2]];
-            if x + 1 < width as usize {
-                columns[2] = Range::of_column(&rows, x + 1);
-            }
-            *class = columns[0].union(columns[1]).union(columns[2]).class(phase);
+        for (block, classes) in row.chunks_mut(BLOCK).enumerate() {
+            classify_block(&rows, block * BLOCK, limit, classes);
         }
     });
 }
 
-/// Smallest and largest velocity of some cells.
-#[derive(Clone, Copy)]
-struct Range {
-    min: [i16; 2],
-    max: [i16; 2],
-}
+/// Cells whose ranges are computed together.
+const BLOCK: usize = 64;
 
-impl Range {
-    fn of_column(rows: &[&[Velocity]; 3], x: usize) -> Self {
-        let [above, here, below] = rows.map(|row| {
-            let v = [row[x].x, row[x].y];
-            Self { min: v, max: v }
-        });
-        above.union(here).union(below)
-    }
-
-    fn union(self, other: Self) -> Self {
-        Self {
-            min: [self.min[0].min(other.min[0]), self.min[1].min(other.min[1])],
-            max: [self.max[0].max(other.max[0]), self.max[1].max(other.max[1])],
+/// Classes of the cells from `first` on.
+fn classify_block(rows: &[&[[i16; 2]]; 3], first: usize, limit: u16, classes: &mut [CellClass]) {
+    // Smallest and largest of each column, from the one before the block to the one after it;
+    // beyond the grid the column at its edge again, which changes neither.
+    let (mut min, mut max) = ([[0; 2]; BLOCK + 2], [[0; 2]; BLOCK + 2]);
+    let last = rows[0].len() - 1;
+    let (from, to) = (first.saturating_sub(1), (first + classes.len()).min(last));
+    let skipped = from + 1 - first;
+    let columns = rows.map(|row| row[from..=to].as_flattened());
+    let into = |ranges: &mut [[i16; 2]; BLOCK + 2], pick: fn(i16, i16) -> i16| {
+        let flat = ranges[skipped..].as_flattened_mut();
+        let cells = columns[0].iter().zip(columns[1]).zip(columns[2]);
+        for (range, ((above, here), below)) in flat.iter_mut().zip(cells) {
+            *range = pick(pick(*above, *here), *below);
         }
-    }
-
-    fn class(self, phase: Phase) -> CellClass {
+        if skipped > 0 {
+            ranges[0] = ranges[1];
+        }
+        let end = to + 1 - first;
+        ranges[classes.len() + 1] = ranges[end];
+    };
+    into(&mut min, i16::min);
+    into(&mut max, i16::max);
+    for (i, class) in classes.iter_mut().enumerate() {
         let agrees = |axis: usize| {
-            let range = i32::from(self.max[axis]) - i32::from(self.min[axis]);
-            self.min[axis] != HOLE.x && (range * phase.q12()) >> 9 <= SMOOTH_RANGE
+            let min = min[i][axis].min(min[i + 1][axis]).min(min[i + 2][axis]);
+            let max = max[i][axis].max(max[i + 1][axis]).max(max[i + 2][axis]);
+            let range = max.wrapping_sub(min).cast_unsigned();
+            (min != HOLE.x) & (range <= limit)
         };
-        if agrees(0) && agrees(1) { CellClass::Smooth } else { CellClass::Broken }
+        *class = if agrees(0) & agrees(1) { CellClass::Smooth } else { CellClass::Broken };
     }
 }

@@ -8,7 +8,7 @@ use crate::field::{FieldAxis, FieldMap};
 use crate::key::{KeyFrame, Velocity};
 use crate::phase::Phase;
 use crate::plane::Plane;
-use crate::trajectory::dilate_motion::nearest_in_3x3;
+use crate::trajectory::dilate_motion::dilate_depth_row;
 
 /// Rows of a band. Few enough for its planes to stay in a core's cache, many enough that
 /// few source rows are visited by two bands.
@@ -42,13 +42,12 @@ impl SourceField {
         });
         let velocity = &self.velocity;
         crate::bands::for_each_row(pool, &mut self.depth, |y, row| {
-            for (x, depth) in (0..).zip(row) {
-                *depth = if has_depth {
-                    nearest_in_3x3(&key.depth, x, y).1
-                } else {
-                    let Velocity { x: vx, y: vy } = velocity.at(x, y);
-                    (u32::from(vx.unsigned_abs()) + u32::from(vy.unsigned_abs())) >> 5
-                };
+            if has_depth {
+                dilate_depth_row(&key.depth, y, row);
+                return;
+            }
+            for (depth, &Velocity { x, y }) in row.iter_mut().zip(velocity.row(y)) {
+                *depth = (u32::from(x.unsigned_abs()) + u32::from(y.unsigned_abs())) >> 5;
             }
         });
         self.reach.clear();
@@ -124,6 +123,29 @@ impl Band<'_> {
                 let (left, fx) = (target_x >> 8, (target_x & 0xff).cast_unsigned());
                 let (above, fy) = (target_y >> 8, (target_y & 0xff).cast_unsigned());
                 let index = y * width as u32 + x;
+                // Most cells: all four inside, or on a column and row and so a single one.
+                let inside_y = above as isize - first_row;
+                if (0..rows - 1).contains(&inside_y) && (0..width as i32 - 1).contains(&left) {
+                    let place = inside_y.cast_unsigned() * width + left as usize;
+                    let candidate = |way: u32| ((way >> 2) << SOURCE_BITS) | index;
+                    cell(&mut self.top[place], &mut self.splat[place], depth, candidate(fx + fy));
+                    if fx | fy == 0 {
+                        continue;
+                    }
+                    let mut beside = |place: usize, way: u32| {
+                        cell(&mut self.top[place], &mut self.splat[place], depth, candidate(way));
+                    };
+                    if fx > 0 {
+                        beside(place + 1, 256 - fx + fy);
+                    }
+                    if fy > 0 {
+                        beside(place + width, fx + 256 - fy);
+                        if fx > 0 {
+                            beside(place + width + 1, 512 - fx - fy);
+                        }
+                    }
+                    continue;
+                }
                 for (row, way_y) in [(above, fy), (above + 1, 256 - fy)] {
                     let row = row as isize - first_row;
                     if way_y == 256 || row < 0 || row >= rows {

@@ -21,6 +21,8 @@
 //! the source rows that can reach it, so the result is the same for any number of threads.
 
 mod cpu;
+#[cfg(test)]
+mod tests;
 
 pub use cpu::{SourceField, scatter};
 

@@ -1,0 +1,143 @@
+//! Reads eight `rgba8` pixels at a time between their neighbours.
+//!
+//! The same arithmetic as [`super::sse2`], in both halves of a register, behind the clamp of
+//! [`crate::warp::sample`]. The caller asks the processor whether it has AVX2.
+
+use std::arch::x86_64::{
+    __m256i, _mm256_add_epi16, _mm256_add_epi32, _mm256_and_si256, _mm256_i32gather_epi32,
+    _mm256_loadu_si256, _mm256_madd_epi16, _mm256_max_epi32, _mm256_min_epi32, _mm256_mullo_epi16,
+    _mm256_mullo_epi32, _mm256_or_si256, _mm256_packs_epi32, _mm256_packus_epi16,
+    _mm256_set1_epi16, _mm256_set1_epi32, _mm256_setzero_si256, _mm256_shuffle_epi32,
+    _mm256_slli_epi32, _mm256_srai_epi32, _mm256_srli_epi32, _mm256_storeu_si256, _mm256_sub_epi32,
+    _mm256_unpackhi_epi8, _mm256_unpackhi_epi16, _mm256_unpackhi_epi32, _mm256_unpacklo_epi8,
+    _mm256_unpacklo_epi16, _mm256_unpacklo_epi32, _mm256_xor_si256,
+};
+
+use super::Rgba8;
+use crate::plane::{Plane, Rect};
+
+/// Pixels of one step.
+pub(super) const LANES: usize = 8;
+
+/// One axis of eight positions: the pixel before, the pixel after, the way between them.
+struct Between {
+    low: __m256i,
+    high: __m256i,
+    way: __m256i,
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn between(position: __m256i, start: u32, length: u32) -> Between {
+    let last_pixel = (start + length - 1).cast_signed();
+    let first = _mm256_set1_epi32((start << 8).cast_signed());
+    let last = _mm256_set1_epi32(last_pixel << 8);
+    let clamped = _mm256_min_epi32(_mm256_max_epi32(position, first), last);
+    let low = _mm256_srai_epi32(clamped, 8);
+    let next = _mm256_add_epi32(low, _mm256_set1_epi32(1));
+    Between {
+        low,
+        high: _mm256_min_epi32(next, _mm256_set1_epi32(last_pixel)),
+        way: _mm256_and_si256(clamped, _mm256_set1_epi32(0xff)),
+    }
+}
+
+/// The colours of `plane` at the Q8 positions `xs`, `ys`, clamped to `valid`.
+///
+/// # Panics
+/// If `valid` does not lie inside the plane, or the plane has 2^31 pixels or more.
+#[target_feature(enable = "avx2")]
+pub(super) fn sample_eight(
+    plane: &Plane<Rgba8>,
+    valid: Rect,
+    xs: &[i32; LANES],
+    ys: &[i32; LANES],
+    out: &mut [Rgba8; LANES],
+) {
+    assert!(valid.fits(plane.width(), plane.height()), "the valid rectangle lies inside the plane");
+    assert!(i32::try_from(plane.data().len()).is_ok(), "every pixel has a 32-bit index");
+    // SAFETY: both arrays hold 8 values of 32 bits, and the load needs no alignment.
+    let (x, y) =
+        unsafe { (_mm256_loadu_si256(xs.as_ptr().cast()), _mm256_loadu_si256(ys.as_ptr().cast())) };
+    let (x, y) = (between(x, valid.x, valid.width), between(y, valid.y, valid.height));
+    let width = _mm256_set1_epi32(plane.width().cast_signed());
+    let (top, bottom) = (_mm256_mullo_epi32(y.low, width), _mm256_mullo_epi32(y.high, width));
+    let read = |row: __m256i, column: __m256i| {
+        // SAFETY: `between` clamps to `valid`, which lies inside the plane (asserted above), so
+        // row * width + column is the index of a pixel of 4 bytes.
+        unsafe {
+            _mm256_i32gather_epi32::<4>(plane.data().as_ptr().cast(), _mm256_add_epi32(row, column))
+        }
+    };
+    let rows = [
+        across(read(top, x.low), read(top, x.high), x.way),
+        across(read(bottom, x.low), read(bottom, x.high), x.way),
+    ];
+    let pixels = down(rows, y.way);
+    // SAFETY: `out` holds 8 pixels of 32 bits, and the store needs no alignment.
+    unsafe { _mm256_storeu_si256(out.as_mut_ptr().cast(), pixels) };
+}
+
+/// Interpolates to the right: 16 bits per channel, the low and the high two pixels of each half.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn across(left: __m256i, right: __m256i, way: __m256i) -> [__m256i; 2] {
+    let zero = _mm256_setzero_si256();
+    let twice = |weight: __m256i| _mm256_or_si256(weight, _mm256_slli_epi32(weight, 16));
+    let right_weight = twice(way);
+    let left_weight = twice(_mm256_sub_epi32(_mm256_set1_epi32(256), way));
+    let mix = |left: __m256i, right: __m256i, left_weight: __m256i, right_weight: __m256i| {
+        _mm256_add_epi16(
+            _mm256_mullo_epi16(left, left_weight),
+            _mm256_mullo_epi16(right, right_weight),
+        )
+    };
+    [
+        mix(
+            _mm256_unpacklo_epi8(left, zero),
+            _mm256_unpacklo_epi8(right, zero),
+            _mm256_unpacklo_epi32(left_weight, left_weight),
+            _mm256_unpacklo_epi32(right_weight, right_weight),
+        ),
+        mix(
+            _mm256_unpackhi_epi8(left, zero),
+            _mm256_unpackhi_epi8(right, zero),
+            _mm256_unpackhi_epi32(left_weight, left_weight),
+            _mm256_unpackhi_epi32(right_weight, right_weight),
+        ),
+    ]
+}
+
+/// Interpolates downwards and rounds to 8 bits per channel.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn down([top, bottom]: [[__m256i; 2]; 2], way: __m256i) -> __m256i {
+    let top_weight = _mm256_sub_epi32(_mm256_set1_epi32(256), way);
+    let weights = _mm256_or_si256(top_weight, _mm256_slli_epi32(way, 16));
+    // The multiplication is of signed numbers: half the range is taken off and put back.
+    let centred = |rows: __m256i| _mm256_xor_si256(rows, _mm256_set1_epi16(i16::MIN));
+    let weigh = |rows: __m256i, weights: __m256i| {
+        let sum = _mm256_madd_epi16(rows, weights);
+        let back = _mm256_set1_epi32(32768 * 256 + 32768);
+        _mm256_srli_epi32(_mm256_add_epi32(sum, back), 16)
+    };
+    let (low_top, low_bottom) = (centred(top[0]), centred(bottom[0]));
+    let (high_top, high_bottom) = (centred(top[1]), centred(bottom[1]));
+    let first = weigh(
+        _mm256_unpacklo_epi16(low_top, low_bottom),
+        _mm256_shuffle_epi32::<0b00_00_00_00>(weights),
+    );
+    let second = weigh(
+        _mm256_unpackhi_epi16(low_top, low_bottom),
+        _mm256_shuffle_epi32::<0b01_01_01_01>(weights),
+    );
+    let third = weigh(
+        _mm256_unpacklo_epi16(high_top, high_bottom),
+        _mm256_shuffle_epi32::<0b10_10_10_10>(weights),
+    );
+    let fourth = weigh(
+        _mm256_unpackhi_epi16(high_top, high_bottom),
+        _mm256_shuffle_epi32::<0b11_11_11_11>(weights),
+    );
+    _mm256_packus_epi16(_mm256_packs_epi32(first, second), _mm256_packs_epi32(third, fourth))
+}
