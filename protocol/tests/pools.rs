@@ -198,3 +198,18 @@ fn slots_of_a_pool_are_apart_and_outlive_it() {
     let second = writer.join().unwrap();
     assert!(slots[0].iter().all(|&byte| byte == 1) && second.iter().all(|&byte| byte == 2));
 }
+
+#[test]
+fn no_pool_installs_a_signal_handler() {
+    // The runtime has handlers of its own from the start; what counts is that none is added.
+    let caught = || {
+        let status = std::fs::read_to_string("/proc/self/status").unwrap();
+        status.lines().find(|line| line.starts_with("SigCgt:")).map(str::to_owned).unwrap()
+    };
+    let before = caught();
+    let (pool, _slots) = WritablePool::allocate("test", 1, SLOT).unwrap();
+    let fd = pool.fd().try_clone_to_owned().unwrap();
+    let reader = ReadOnlyPool::accept(fd, SLOT, SLOT).unwrap();
+    reader.copy_to(0, &mut [0; 16]).unwrap();
+    assert_eq!(caught(), before);
+}

@@ -165,10 +165,12 @@ impl<'a> Sequence<'a> {
             found.0,
             found.1
         );
-        match &sidecar.foreframe {
+        let frame = match &sidecar.foreframe {
             Some(exported) => self.exported_frame(sidecar, exported),
             None => self.rendered_frame(sidecar),
-        }
+        }?;
+        frame.submit.validate()?;
+        Ok(frame)
     }
 
     /// A frame that [`super::export`] wrote.
@@ -302,7 +304,7 @@ impl<'a> Sequence<'a> {
         let earlier = self.sidecars.values().find(|earlier| {
             motion_from_ns.is_some_and(|time| ORIGIN_NS + earlier.time_ns() == time)
         });
-        let submit = Submit {
+        Ok(Submit {
             stream: STREAM,
             slot: 0,
             key_index: sidecar.frame,
@@ -312,9 +314,7 @@ impl<'a> Sequence<'a> {
             planes: descriptors,
             camera: sidecar.camera()?,
             motion_from_camera: earlier.map(Sidecar::camera).transpose()?.flatten(),
-        };
-        submit.validate()?;
-        Ok(submit)
+        })
     }
 }
 

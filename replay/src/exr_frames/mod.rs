@@ -6,9 +6,13 @@
 //! lack any plane but colour. Nothing is resampled: what can be stored bit for bit is.
 
 pub mod blender;
+pub mod export;
 pub mod exported;
 pub mod image;
 pub mod import;
 pub mod sidecar;
 pub mod sky;
 pub mod srgb;
+
+#[cfg(test)]
+mod tests;

@@ -1,10 +1,8 @@
 //! What an application meets while the daemon works, lags, errs and dies.
 
-mod fake_daemon;
-
 use std::time::Duration;
 
-use fake_daemon::{PATIENCE, connect};
+use crate::fake_daemon::{PATIENCE, connect};
 use foreframe_client::{
     ConnectOptions, Error, Event, Key, PlaneKind, ReleaseReason, StreamOptions, StreamState,
 };
