@@ -165,3 +165,67 @@ fn draw_legend(canvas: &mut Canvas, layout: &SheetLayout) {
     let what = "largest channel difference, in levels of 255";
     canvas.text(what, [left - 16.0, top + 13.0], style);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draw::palette::PAGE;
+
+    fn row<'a>(pixels: &'a [Vec<u8>; 3], [width, height]: [u32; 2]) -> ContactSheetRow<'a> {
+        let image = |index: usize| Rgba8Image::new(width, height, &pixels[index]).unwrap();
+        ContactSheetRow {
+            label: "key 0".to_owned(),
+            detail: "30 dB".to_owned(),
+            key: image(0),
+            in_between: image(1),
+            truth: image(2),
+        }
+    }
+
+    fn flat(color: [u8; 4], count: usize) -> Vec<u8> {
+        color.repeat(count)
+    }
+
+    #[test]
+    fn each_image_fills_one_column_of_its_row_and_nothing_beside_it() {
+        let size = [200, 100];
+        let colors = [[9, 200, 9, 255], [200, 9, 9, 255], [190, 9, 9, 255]];
+        let pixels = colors.map(|color| flat(color, 200 * 100));
+        let sheet = contact_sheet("", &[row(&pixels, size), row(&pixels, size)]).unwrap();
+        let layout = SheetLayout::new(size, 2).unwrap();
+        let error = heat(40);
+        let expected = [[9, 200, 9], [200, 9, 9], [190, 9, 9], error];
+        for (row, column) in [(0, 0), (0, 1), (0, 2), (0, 3), (1, 0), (1, 3)] {
+            let [x, y] = layout.corner(column, row);
+            let rgb = |x: u32, y: u32| {
+                let pixel = sheet.pixel(x, y).unwrap();
+                [pixel.red(), pixel.green(), pixel.blue()]
+            };
+            let color = expected[column as usize];
+            assert_eq!([rgb(x, y), rgb(x + 199, y + 99)], [color; 2], "column {column}");
+            assert_eq!(rgb(x + 202, y + 50), PAGE, "right of column {column}");
+            assert_eq!(rgb(x + 100, y + 102), PAGE, "below column {column}");
+        }
+    }
+
+    #[test]
+    fn the_error_is_the_largest_channel_difference_times_four() {
+        let (a, b) = ([10, 20, 30, 255], [10, 25, 27, 0]);
+        let image = |pixel| Rgba8Image::new(1, 1, pixel).unwrap();
+        let [red, green, blue] = heat(20);
+        assert_eq!(error_pixels(image(&a), image(&b)), [red, green, blue, 255]);
+        assert_eq!(error_pixels(image(&a), image(&a)), [255; 4]);
+    }
+
+    #[test]
+    fn images_of_two_sizes_no_rows_and_endless_sheets_are_refused() {
+        let pixels = [flat([0; 4], 8), flat([0; 4], 8), flat([0; 4], 8)];
+        let mut odd = row(&pixels, [4, 2]);
+        odd.truth = Rgba8Image::new(2, 4, &pixels[2]).unwrap();
+        let error = contact_sheet("", &[row(&pixels, [4, 2]), odd]).unwrap_err();
+        assert_eq!(error.to_string(), "expected images of 4x2 pixels, found 2x4 in row `key 0`");
+        assert_eq!(contact_sheet("", &[]), Err(PictureError::Empty { expected: "row" }));
+        let layout = SheetLayout::new([400, 400], 100);
+        assert!(matches!(layout, Err(PictureError::TooLarge { .. })));
+    }
+}

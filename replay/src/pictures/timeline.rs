@@ -212,3 +212,52 @@ fn draw_plot(canvas: &mut Canvas, events: &[TimelineEvent], time: &Axis, content
         canvas.fill_disc(point, radius, kind.color());
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn present(at_ms: f64, kind: PresentKind) -> TimelineEvent {
+        TimelineEvent::Present { at_ms, kind, content_ms: None }
+    }
+
+    #[test]
+    fn every_present_is_one_bar_of_its_colour_inside_its_lane() {
+        let events: Vec<_> = (0..)
+            .zip(PresentKind::ALL)
+            .map(|(at, kind)| present(f64::from(at) * 10.0, kind))
+            .collect();
+        let picture = timeline("", &events).unwrap();
+        let row = f32::midpoint(PRESENTS_LANE[0], PRESENTS_LANE[1]) as u32;
+        for kind in PresentKind::ALL {
+            let is_kind = |x: u32, y: u32| {
+                let pixel = picture.pixel(x, y).unwrap();
+                [pixel.red(), pixel.green(), pixel.blue()] == kind.color()
+            };
+            let columns: Vec<u32> = (0..WIDTH).filter(|&x| is_kind(x, row)).collect();
+            let (first, last) = (columns[0], columns[columns.len() - 1]);
+            assert_eq!(
+                last - first + 1,
+                u32::try_from(columns.len()).unwrap(),
+                "one bar of {kind:?}"
+            );
+            assert!(first as f32 >= SIDES[0] && (last as f32) < SIDES[1], "{kind:?}");
+            let below = PRESENTS_LANE[1] as u32..HEIGHT;
+            assert!(below.into_iter().all(|y| !is_kind(first + 2, y)), "{kind:?} below its lane");
+        }
+    }
+
+    #[test]
+    fn the_order_of_events_does_not_matter_and_times_that_are_not_finite_are_left_out() {
+        let mut events = vec![present(1.0, PresentKind::Real), present(9.0, PresentKind::Repeated)];
+        let expected = timeline("", &events).unwrap();
+        events.reverse();
+        events.push(present(f64::NAN, PresentKind::Dropped));
+        assert!(timeline("", &events).unwrap() == expected);
+        let nothing = timeline("", &events[2..]).unwrap_err();
+        assert_eq!(
+            nothing.to_string(),
+            "expected at least one event with finite times, found none"
+        );
+    }
+}
