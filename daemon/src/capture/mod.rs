@@ -1,8 +1,8 @@
 //! Captures: key frames recorded in a file, exactly as they arrived.
 //!
-//! A capture is one MCAP file that every MCAP tool can open. [`container`] and [`index`] are its two
+//! A capture is one MCAP file that every MCAP tool can open. `container` and `index` are its two
 //! halves: writing chunks, and finding them again without trusting more than has been checked.
-//! [`codec`] and [`filter`] turn planes into fewer bytes and back. [`writer`] and [`reader`] add the
+//! `codec` and `filter` turn planes into fewer bytes and back. `writer` and `reader` add the
 //! protocol's meaning: a frame is the submit message that the application sent, plus its planes.
 //!
 //! What is guaranteed: a file that ends anywhere opens up to its last whole frame; what is read
@@ -24,6 +24,7 @@ mod session;
 mod source;
 #[cfg(test)]
 mod tests;
+mod walk;
 mod writer;
 
 pub use codec::{Codec, Coding, Filter, plane_hash};

@@ -207,7 +207,7 @@ impl<S: ReadAt> Capture<S> {
         let (entry, record) = self.record(number)?;
         let submit = self.parse_submit(entry, &record)?;
         let infos = record.planes.iter().map(|plane| &plane.info);
-        check_planes(self.format(entry.stream), infos)
+        check_planes(self.format(entry.stream), &submit, infos)
             .map_err(|bad| damaged("a frame record", entry.record, bad))?;
         let planes = record
             .planes

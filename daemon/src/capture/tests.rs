@@ -259,7 +259,7 @@ fn the_writer_refuses_what_the_reader_would_not_accept() {
         (&|s| s.planes.clear(), "a color plane"),
         (&|s| s.planes.swap(0, 1), "a color plane first"),
         (&|s| s.planes[3].info.which = 0, "motion plane number 1"),
-        (&|s| s.planes[0].info.width = 5, "6x4 pixels of color"),
+        (&|s| s.planes[0].info.width = 5, "color of 6x4 as in the submit message"),
         (&|s| s.planes[1].info.valid.width = 7, "inside 6x4"),
         (&|s| s.planes[1].bytes.truncate(95), "96 bytes of depth"),
     ];

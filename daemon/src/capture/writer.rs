@@ -9,7 +9,9 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use foreframe_protocol::{Body as _, CreateStream, PlaneKind, StreamFormat, Submit};
+use foreframe_protocol::{
+    Body as _, CreateStream, PlaneDescriptor, PlaneKind, PlaneSize, StreamFormat, Submit,
+};
 
 use super::codec::Coding;
 use super::container::{Container, PlaneBytes, Stamp, unrecordable};
@@ -95,7 +97,7 @@ impl<W: Write> CaptureWriter<W> {
             return Err(unrecordable("a frame", bad));
         };
         let infos = planes.iter().map(|plane| &plane.info);
-        check_planes(&stream.format, infos).map_err(|bad| unrecordable("a frame", bad))?;
+        check_planes(&stream.format, submit, infos).map_err(|bad| unrecordable("a frame", bad))?;
         let stamp = Stamp {
             log_time: arrived_at_ns,
             publish_time: submit.content_time_ns,
@@ -122,9 +124,11 @@ impl<W: Write> CaptureWriter<W> {
     }
 }
 
-/// Whether planes are those of a frame in `format`: colour first, each with the declared pixels.
+/// Whether planes are those of a frame in `format`: colour first, each with the declared pixels and
+/// the size that `submit` gives it, none but the user interface larger than the stream.
 pub(super) fn check_planes<'a>(
     format: &StreamFormat,
+    submit: &Submit,
     planes: impl Iterator<Item = &'a PlaneInfo>,
 ) -> Result<(), BadRecord> {
     let mut has_color = false;
@@ -141,13 +145,17 @@ pub(super) fn check_planes<'a>(
             let expected = format!("{name} pixels of {layout}");
             return Err(BadRecord::new(expected, plane.layout));
         }
-        let color = plane.kind == PlaneKind::Color;
-        let size = (plane.width, plane.height);
-        let full = (format.width, format.height);
-        if color && size != full || size.0 > full.0 || size.1 > full.1 {
-            let relation = if color { "" } else { "at most " };
-            let expected = format!("{relation}{}x{} pixels of {name}", full.0, full.1);
-            return Err(BadRecord::new(expected, format!("{}x{}", size.0, size.1)));
+        let size = PlaneSize { width: plane.width, height: plane.height };
+        let described = submit.planes.get(plane.kind).map(PlaneDescriptor::size);
+        if plane.which == 0 && described != Some(size) {
+            let described = described.map_or("no size".to_owned(), |size| size.to_string());
+            let expected = format!("{name} of {described} as in the submit message");
+            return Err(BadRecord::new(expected, size));
+        }
+        let full = PlaneSize { width: format.width, height: format.height };
+        let is_larger = size.width > full.width || size.height > full.height;
+        if is_larger && plane.kind != PlaneKind::Ui {
+            return Err(BadRecord::new(format!("{name} of at most {full}"), size));
         }
     }
     if has_color { Ok(()) } else { Err(BadRecord::new("a color plane", "no plane")) }
