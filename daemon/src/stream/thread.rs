@@ -1,7 +1,7 @@
 //! The thread of a stream: waits for keys and for the pacer's wakes, and carries things to and fro.
 //!
-//! A turn takes at most one key and makes at most one picture, so that neither a flood of keys nor
-//! slow pictures starve the other. Nothing here waits for anybody: sinks, recorder, subscribers and
+//! Between two keys there is always a picture, so that keys that come faster than they can be worked
+//! off do not keep the display from changing; the mailbox keeps the newest meanwhile. Nothing here waits for anybody: sinks, recorder, subscribers and
 //! main loop are all behind queues or slots that can be full.
 
 use std::io;
@@ -86,6 +86,8 @@ struct StreamThread {
     copier: PlaneCopier,
     /// The newest key, until the first picture made from it is shown.
     unshown: Option<Unshown>,
+    /// Whether no picture was made since the newest key was taken in.
+    owes_picture: bool,
     refused: u64,
     repeats_in_a_row: u32,
     synthesis: Mean,
@@ -114,6 +116,7 @@ impl StreamThread {
             core,
             copier: PlaneCopier::default(),
             unshown: None,
+            owes_picture: false,
             refused: 0,
             repeats_in_a_row: 0,
             synthesis: Mean::default(),
@@ -137,6 +140,11 @@ impl StreamThread {
             let is_idle =
                 plan.content_time.is_none() || self.repeats_in_a_row >= REPEATS_BEFORE_IDLE;
             let wake_at = if is_idle { MonoTime::FAR_FUTURE } else { plan.wake_at };
+            if self.owes_picture && !is_idle {
+                clock::sleep_until(wake_at);
+                self.make_frame(&plan);
+                continue;
+            }
             match alarm.wait(&mailbox.waker, wake_at) {
                 Ok(Woken::ByWaker) => {}
                 Ok(Woken::AtDeadline) => self.make_frame(&plan),
@@ -175,6 +183,7 @@ impl StreamThread {
             }
         }
         self.repeats_in_a_row = 0;
+        self.owes_picture = true;
         self.unshown =
             Some(Unshown { key_index: submit.key_index, received_at_ns: arrived_at.as_ns() });
         self.send_pacing(submit.key_index);
@@ -187,6 +196,7 @@ impl StreamThread {
     }
 
     fn make_frame(&mut self, plan: &Plan) {
+        self.owes_picture = false;
         let Some(outcome) = self.core.make(plan, clock::now) else { return };
         match outcome {
             FrameOutcome::Repeated => self.repeats_in_a_row += 1,

@@ -4,6 +4,9 @@
 //! and a test that runs into it fails.
 
 #![allow(dead_code, reason = "each test file uses its own part of the fixture")]
+#![expect(clippy::unwrap_used, reason = "a fixture that cannot go on fails its test")]
+
+pub(crate) mod child;
 
 use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
@@ -178,6 +181,11 @@ impl Client {
         })
     }
 
+    /// What came and was not asked for yet.
+    pub(crate) fn take_waiting(&mut self) -> Vec<DaemonMessage> {
+        self.waiting.drain(..).map(|(message, _)| message).collect()
+    }
+
     /// Reads until the daemon hangs up; everything that it said.
     pub(crate) fn read_to_end(&mut self) -> Vec<DaemonMessage> {
         let mut all: Vec<_> = self.waiting.drain(..).map(|(message, _)| message).collect();
@@ -193,8 +201,22 @@ impl Client {
     }
 
     pub(crate) fn open_stream_of(&mut self, number: u32, format: StreamFormat) -> KeySource {
-        let create =
-            CreateStream { stream: number, format, max_sizes: format.full_sizes(), slots: 3 };
+        self.open_stream_sized(number, format, 1)
+    }
+
+    /// With depth and motion planes that have 1/`divisor` of colour's columns and rows.
+    pub(crate) fn open_stream_sized(
+        &mut self,
+        number: u32,
+        format: StreamFormat,
+        divisor: u32,
+    ) -> KeySource {
+        let max_sizes = PlaneMap::from_fn(|kind| {
+            let PlaneSize { width, height } = *format.full_sizes().get(kind)?;
+            let divisor = if kind == PlaneKind::Color { 1 } else { divisor };
+            Some(PlaneSize { width: width / divisor, height: height / divisor })
+        });
+        let create = CreateStream { stream: number, format, max_sizes, slots: 3 };
         self.send(create);
         self.expect("stream created", |message| match message {
             DaemonMessage::StreamCreated(created) => (created.stream == number).then_some(()),
@@ -306,21 +328,25 @@ impl KeySource {
         Self { create, pool, slots, register, next_key: 0 }
     }
 
+    /// Where the planes of a key lie in its slot, one after the other.
+    pub(crate) fn layout(&self) -> PlaneMap<PlaneDescriptor> {
+        let mut offset = 0;
+        PlaneMap::from_fn(|kind| {
+            let bytes_per_pixel = self.create.format.bytes_per_pixel(kind)?;
+            let size = *self.create.max_sizes.get(kind)?;
+            let plane = PlaneDescriptor::packed(offset, size, bytes_per_pixel);
+            offset = (offset + plane.byte_len(bytes_per_pixel)).next_multiple_of(16);
+            Some(plane)
+        })
+    }
+
     /// The next key, with its colour plane filled and all other planes zero.
     pub(crate) fn fill(&mut self, color: [u8; 4]) -> Submit {
         let key_index = self.next_key;
         self.next_key += 1;
         let slot = (key_index % self.slots.len() as u64) as usize;
-        let format = self.create.format;
-        let mut offset = 0;
-        let planes = PlaneMap::from_fn(|kind| {
-            let bytes_per_pixel = format.bytes_per_pixel(kind)?;
-            let size = *self.create.max_sizes.get(kind)?;
-            let plane = PlaneDescriptor::packed(offset, size, bytes_per_pixel);
-            offset = (offset + plane.byte_len(bytes_per_pixel)).next_multiple_of(16);
-            Some(plane)
-        });
-        let pixels = color_bytes(&format);
+        let planes = self.layout();
+        let pixels = color_bytes(&self.create.format);
         for pixel in self.slots[slot][..pixels].chunks_exact_mut(4) {
             pixel.copy_from_slice(&color);
         }
