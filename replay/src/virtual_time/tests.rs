@@ -34,7 +34,18 @@ fn replayed_at(
     timing: KeyTiming,
 ) -> Shown {
     let plan = Plan::new(&recording.heads, count(4));
-    let reader = KeyReader::new(recording.format(), &plan).unwrap();
+    replayed_plan(recording, &plan, method, threads, refresh_hz, timing)
+}
+
+fn replayed_plan(
+    recording: &mut MemoryRecording,
+    plan: &Plan,
+    method: Method,
+    threads: usize,
+    refresh_hz: f64,
+    timing: KeyTiming,
+) -> Shown {
+    let reader = KeyReader::new(recording.format(), plan).unwrap();
     let config = ReplayConfig {
         method,
         threads: count(threads),
@@ -42,7 +53,7 @@ fn replayed_at(
     };
     let mut digester = FrameDigester::default();
     let mut frames = Vec::new();
-    let keys = timed_keys(recording, &reader, &plan, timing);
+    let keys = timed_keys(recording, &reader, plan, timing);
     let losses = replay(*reader.format(), &config, keys, |frame, picture| {
         frames.push((*frame, digester.add(picture)));
         Ok(())
@@ -138,6 +149,27 @@ fn stepping_takes_the_jitter_of_the_recording_out() {
         .map(|recording| shown(recording, KeyTiming::Stepped));
     assert_eq!(stepped, plain);
     assert_ne!(shown(&mut jittered, KeyTiming::AsRecorded), plain, "as recorded keeps it");
+}
+
+#[test]
+fn after_a_lost_key_content_time_never_runs_back_and_soon_advances_evenly_again() {
+    // Recorded at the key rate, as a daemon does; the key of frame 12 was lost.
+    let mut gap = recording();
+    let kept = [0, 4, 8, 16, 20, 24];
+    gap.heads = kept.map(|frame| gap.heads[frame].clone()).to_vec();
+    gap.frames = kept.map(|frame| gap.frames[frame].clone()).to_vec();
+    let plan = Plan::new(&gap.heads, count(1));
+    let timing = KeyTiming::AsRecorded;
+    let shown = replayed_plan(&mut gap, &plan, Method::Linear, 1, 120.0, timing);
+    assert_eq!(shown.losses, Losses::default());
+    let contents: Vec<_> = shown.frames.iter().map(|(frame, _)| frame.content_time).collect();
+    assert!(contents.is_sorted(), "{contents:?}");
+    let after = shown.frames.iter().filter(|(frame, _)| frame.key == 4);
+    let times: Vec<_> = after.map(|(frame, _)| frame.content_time).collect();
+    let interval = MonoSpan::from_hz(120.0);
+    for pair in times.windows(2) {
+        assert!(((pair[1] - pair[0]) - interval).as_ns().abs() < interval.as_ns() / 20);
+    }
 }
 
 #[test]
