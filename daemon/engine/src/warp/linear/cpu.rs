@@ -82,6 +82,11 @@ fn gather_row<T: Texel>(frame: &Frame<'_>, color: &Plane<T>, index_y: u32, row: 
         let (xs, ys) = (&mut xs[..texels.len()], &mut ys[..texels.len()]);
         between.positions(first, xs, ys);
         T::sample_each(color, frame.valid, xs, ys, texels);
+        let end = first + texels.len() as u32 - 1;
+        let (left, right) = (frame.map.x.cell_of(first), frame.map.x.cell_of(end));
+        if !class[left as usize..=right as usize].contains(&CellClass::Broken) {
+            continue;
+        }
         for (index_x, texel) in (first..).zip(texels) {
             if class[frame.map.x.cell_of(index_x) as usize] == CellClass::Broken {
                 let p_x = ((frame.valid.x + index_x) << 8).cast_signed();
