@@ -6,6 +6,7 @@
 
 pub mod cli;
 pub mod commands;
+pub mod demo;
 pub mod draw;
 pub mod exr_frames;
 pub mod output;

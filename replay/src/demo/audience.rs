@@ -1,0 +1,170 @@
+//! The demo's audience: subscribes to the output and compares every frame with the truth.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use anyhow::Context as _;
+use foreframe_client::{Client, ConnectOptions, Event, OutputFrame, OutputKind, OutputSource};
+use foreframe_engine::MonoTime;
+
+use super::CONNECT_TIMEOUT;
+use super::rehearsal::Rehearsal;
+
+/// Slots of the subscription: one is looked at while the next ones are written.
+const SLOTS: u32 = 6;
+/// Time between two looks at whether the show is over.
+const PATIENCE: Duration = Duration::from_millis(50);
+/// Where in the show the frames are that are kept for the contact sheet, as shares of its length.
+const KEPT_AT: [f64; 4] = [0.37, 0.55, 0.73, 0.91];
+
+/// One output frame as it was received.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Shown {
+    /// How it came to be.
+    pub kind: OutputKind,
+    /// Counts output frames, those that were not received included.
+    pub sequence: u64,
+    /// The key that it was made from.
+    pub key_index: u64,
+    /// Position after that key.
+    pub phase: f64,
+    /// Simulation time that it shows, nanoseconds after the first key.
+    pub content_ns: u64,
+    /// When it was planned to be shown.
+    pub present_at: MonoTime,
+    /// Against the truth of its content time, if that was rendered.
+    pub psnr_rgb_db: Option<f64>,
+}
+
+/// An in-between frame that is kept to be looked at.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Kept {
+    /// What it is.
+    pub shown: Shown,
+    /// Red, green, blue, alpha of its pixels.
+    pub rgba: Vec<u8>,
+}
+
+/// Everything that the audience saw.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Seen {
+    /// Every frame, in order.
+    pub frames: Vec<Shown>,
+    /// A few in-between frames.
+    pub kept: Vec<Kept>,
+    /// Frames that were made while all slots of the subscription were in use.
+    pub not_received: u64,
+}
+
+/// A client that watches.
+#[derive(Debug)]
+pub struct Audience {
+    client: Client,
+    base: MonoTime,
+}
+
+impl Audience {
+    /// Connects and subscribes to whatever the daemon shows. The first key is due at `base`.
+    ///
+    /// # Errors
+    /// If the daemon refuses.
+    pub fn connect(options: &ConnectOptions, base: MonoTime) -> anyhow::Result<Self> {
+        let mut client = options.connect(CONNECT_TIMEOUT).context("connecting as the audience")?;
+        client.subscribe(OutputSource::Display, SLOTS).context("subscribing to the output")?;
+        Ok(Self { client, base })
+    }
+
+    /// Watches until `is_over`, which the application sets when its stream has ended.
+    ///
+    /// # Errors
+    /// If the daemon goes away.
+    pub fn watch(mut self, rehearsal: &Rehearsal, is_over: &AtomicBool) -> anyhow::Result<Seen> {
+        let mut seen = Seen::default();
+        let mut pixels = Vec::new();
+        while !is_over.load(Ordering::Relaxed) {
+            self.client.wait(PATIENCE).context("waiting for output frames")?;
+            while let Some(event) = self.client.next_event() {
+                if let Event::Output(frame) = event {
+                    self.take(&frame, rehearsal, &mut pixels, &mut seen)?;
+                }
+            }
+        }
+        Ok(seen)
+    }
+
+    fn take(
+        &mut self,
+        frame: &OutputFrame,
+        rehearsal: &Rehearsal,
+        pixels: &mut Vec<u8>,
+        seen: &mut Seen,
+    ) -> anyhow::Result<()> {
+        pixels.clear();
+        frame.copy_to_vec(pixels).context("copying an output frame")?;
+        let content_ns = frame.content_time_ns().saturating_sub(self.base.as_ns());
+        let truth = rehearsal.rendered_truth(content_ns);
+        let shown = Shown {
+            kind: frame.kind(),
+            sequence: frame.sequence(),
+            key_index: frame.key_index(),
+            phase: f64::from(frame.phase_q12()) / 4096.0,
+            content_ns,
+            present_at: MonoTime::from_ns(frame.present_at_ns()),
+            psnr_rgb_db: truth.map(|truth| psnr_rgb_db(pixels, truth)),
+        };
+        seen.frames.push(shown);
+        seen.not_received = frame.skipped();
+        if shown.kind == OutputKind::Synthesised {
+            self.keep(shown, rehearsal, pixels, seen);
+        }
+        Ok(())
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "a show lasts seconds, far below 2^53 ns")]
+    fn keep(&self, shown: Shown, rehearsal: &Rehearsal, pixels: &[u8], seen: &mut Seen) {
+        let options = &rehearsal.footage.options;
+        let duration_ns = options.key_interval_ns * u64::from(options.keys);
+        let Some(due) = KEPT_AT.get(seen.kept.len()) else { return };
+        // Rows take turns between the frames right after a key and the last ones before the next.
+        let wants_late = seen.kept.len() % 2 == 1;
+        if shown.content_ns as f64 >= due * duration_ns as f64 && (shown.phase >= 0.5) == wants_late
+        {
+            seen.kept.push(Kept { shown, rgba: pixels.to_vec() });
+        }
+    }
+}
+
+/// Peak signal-to-noise ratio in dB of `rgba` against `rgb`, all three channels together, 8-bit
+/// sRGB-encoded; 100 where they are equal.
+#[must_use]
+#[expect(clippy::cast_precision_loss, reason = "sums of a picture are far below 2^53")]
+pub fn psnr_rgb_db(rgba: &[u8], rgb: &[u8]) -> f64 {
+    let rows = rgba.chunks(4 * 1024).zip(rgb.chunks(3 * 1024));
+    let sum: u64 = rows.map(|(rgba, rgb)| u64::from(squared_error(rgba, rgb))).sum();
+    if sum == 0 {
+        return 100.0;
+    }
+    let mean = sum as f64 / rgb.len() as f64;
+    10.0 * (255.0 * 255.0 / mean).log10()
+}
+
+/// Sum over at most 1024 pixels: below 2^28.
+fn squared_error(rgba: &[u8], rgb: &[u8]) -> u32 {
+    let pixels = rgba.as_chunks::<4>().0.iter().zip(rgb.as_chunks::<3>().0);
+    let square = |a: u8, b: u8| u32::from(a.abs_diff(b)) * u32::from(a.abs_diff(b));
+    pixels.map(|(a, b)| square(a[0], b[0]) + square(a[1], b[1]) + square(a[2], b[2])).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_pictures_count_as_100_db_and_one_level_everywhere_as_48() {
+        let rgba = [10, 20, 30, 255].repeat(5000);
+        let rgb = [10, 20, 30].repeat(5000);
+        assert_eq!(psnr_rgb_db(&rgba, &rgb).to_bits(), 100.0_f64.to_bits());
+        let off = [11, 19, 31].repeat(5000);
+        assert!((psnr_rgb_db(&rgba, &off) - 48.1308).abs() < 1e-3, "20 log10 255");
+    }
+}

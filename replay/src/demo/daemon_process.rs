@@ -1,0 +1,96 @@
+//! The demo's daemon: a second process on a private socket.
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+
+use anyhow::{Context as _, bail};
+use foreframe_engine::MonoSpan;
+use foreframed::clock;
+use rustix::process::{Pid, Signal, kill_process};
+use tempfile::TempDir;
+
+use super::Settings;
+
+/// Time that the daemon has to open its socket.
+const START_TIMEOUT: MonoSpan = MonoSpan::from_ms(10_000);
+/// Time between two looks for the socket.
+const POLL: MonoSpan = MonoSpan::from_ms(5);
+
+/// A running daemon. Killed when dropped.
+#[derive(Debug)]
+pub struct DaemonProcess {
+    child: Child,
+    folder: TempDir,
+}
+
+impl DaemonProcess {
+    /// Starts this very program as `serve` and waits for its socket.
+    ///
+    /// # Errors
+    /// If it cannot be started or ends at once; it has then said why on standard error.
+    pub fn start(settings: &Settings) -> anyhow::Result<Self> {
+        let program = std::env::current_exe().context("finding this program")?;
+        let folder = tempfile::Builder::new()
+            .prefix("foreframe-demo-")
+            .tempdir()
+            .context("making a folder for the demo's socket")?;
+        let child = Command::new(&program)
+            .arg("serve")
+            .arg("--socket")
+            .arg(socket_in(folder.path()))
+            .args(["--sink", &settings.sink])
+            .args(["--refresh", &settings.refresh_hz.to_string()])
+            .args(["--method", settings.method.name()])
+            .args(["--log", "warn"])
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .spawn()
+            .with_context(|| format!("starting {}", program.display()))?;
+        let mut daemon = Self { child, folder };
+        let give_up_at = clock::now() + START_TIMEOUT;
+        while !daemon.socket().exists() {
+            if let Some(status) = daemon.child.try_wait()? {
+                bail!("expected the daemon to listen, found that it ended with {status}");
+            }
+            if clock::now() > give_up_at {
+                bail!("expected the daemon's socket within {START_TIMEOUT}, found none");
+            }
+            clock::sleep_until(clock::now() + POLL);
+        }
+        Ok(daemon)
+    }
+
+    /// Where it listens.
+    #[must_use]
+    pub fn socket(&self) -> PathBuf {
+        socket_in(self.folder.path())
+    }
+
+    /// Asks it to end and waits until it has.
+    ///
+    /// # Errors
+    /// If it ends with anything but success.
+    pub fn stop(mut self) -> anyhow::Result<()> {
+        let id = i32::try_from(self.child.id()).ok().and_then(Pid::from_raw);
+        let pid = id.context("the daemon has no process id")?;
+        kill_process(pid, Signal::TERM).context("asking the daemon to end")?;
+        let status = self.child.wait().context("waiting for the daemon")?;
+        if !status.success() {
+            bail!("expected the daemon to end well, found {status}");
+        }
+        Ok(())
+    }
+}
+
+impl Drop for DaemonProcess {
+    fn drop(&mut self) {
+        // It has ended already unless something went wrong, and then that is what gets reported.
+        let _killed = self.child.kill();
+        let _status = self.child.wait();
+    }
+}
+
+/// In a folder that the daemon makes, for its owner alone.
+fn socket_in(folder: &Path) -> PathBuf {
+    folder.join("private").join("daemon.sock")
+}

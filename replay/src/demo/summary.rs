@@ -1,0 +1,294 @@
+//! What happened, in numbers ([`Summary`]), in ten lines ([`Summary::text`]), and in pictures.
+
+use std::fs;
+use std::path::PathBuf;
+
+use anyhow::Context as _;
+use foreframe_client::OutputKind;
+use foreframe_engine::{MonoSpan, MonoTime};
+use serde::Serialize;
+
+use super::Settings;
+use super::application::Submissions;
+use super::audience::{Kept, Seen, Shown, psnr_rgb_db};
+use super::rehearsal::Rehearsal;
+use crate::draw::Rgba8Image;
+use crate::pictures::{ContactSheetRow, PresentKind, TimelineEvent, contact_sheet, timeline};
+
+/// Part of the show that the timeline draws: after the pacer has settled, 0.4 s.
+const TIMELINE_FROM: MonoSpan = MonoSpan::from_ms(1000);
+const TIMELINE_SPAN: MonoSpan = MonoSpan::from_ms(400);
+
+/// The demo's result. Times in milliseconds are medians unless their name says otherwise.
+#[derive(Serialize, Clone, PartialEq, Debug)]
+pub struct Summary {
+    /// Keys that were submitted.
+    pub key_frames: u64,
+    /// Keys that were left out because no slot was free.
+    pub skipped_keys: u64,
+    /// Output frames that were shown.
+    pub presented: u64,
+    /// Of these, keys as they came.
+    pub real: u64,
+    /// Of these, in-between frames.
+    pub synthesised: u64,
+    /// Of these, pictures shown before.
+    pub repeated: u64,
+    /// Frames that were not ready in time.
+    pub dropped: u64,
+    /// Of these, after the first second.
+    pub dropped_after_first_second: u64,
+    /// Share of planned in-between frames that were dropped after the first second, percent.
+    pub dropped_percent: f64,
+    /// Standard deviation of the content-time step over the refresh interval.
+    pub content_judder: f64,
+    /// Mean over the in-between frames whose truth was rendered.
+    pub psnr_rgb_db: f64,
+    /// The worst of them.
+    pub psnr_rgb_min_db: f64,
+    /// In-between frames that were compared.
+    pub compared: u64,
+    /// Real frames that were compared and differ from their key.
+    pub real_frames_changed: u64,
+    /// Time to fill a slot and submit it.
+    pub fill_and_submit_ms: f64,
+    /// Time to make an in-between frame, mean of the daemon.
+    pub synthesis_ms: f64,
+    /// Where the engine ran.
+    pub backend: &'static str,
+    /// How in-between frames were made.
+    pub method: &'static str,
+    /// The scene.
+    pub scene: &'static str,
+    /// Columns of a frame.
+    pub width: u32,
+    /// Rows of a frame.
+    pub height: u32,
+    /// Keys per second.
+    pub key_rate_hz: f64,
+    /// Refreshes per second.
+    pub refresh_hz: f64,
+    /// Where the pictures are.
+    pub out: PathBuf,
+}
+
+impl Summary {
+    /// Counts what was submitted and seen.
+    #[must_use]
+    pub fn new(
+        settings: &Settings,
+        rehearsal: &Rehearsal,
+        submissions: &Submissions,
+        seen: &Seen,
+    ) -> Self {
+        let statistics = submissions.statistics;
+        let count =
+            |field: fn(&foreframe_client::Statistics) -> u64| statistics.as_ref().map_or(0, field);
+        let settled = |field: fn(&foreframe_client::Statistics) -> u64| {
+            count(field) - submissions.settled.as_ref().map_or(0, field).min(count(field))
+        };
+        let dropped = settled(|counts| counts.dropped);
+        let planned = settled(|counts| counts.synthesised) + dropped;
+        let compared: Vec<f64> = compared(seen, rehearsal);
+        let options = &rehearsal.footage.options;
+        Self {
+            key_frames: submissions.sent.len() as u64,
+            skipped_keys: submissions.skipped,
+            presented: count(|counts| counts.presented),
+            real: count(|counts| counts.real),
+            synthesised: count(|counts| counts.synthesised),
+            repeated: count(|counts| counts.repeated),
+            dropped: count(|counts| counts.dropped),
+            dropped_after_first_second: dropped,
+            dropped_percent: 100.0 * ratio(dropped, planned),
+            content_judder: content_judder(&seen.frames, settings.refresh_hz),
+            psnr_rgb_db: mean(&compared),
+            psnr_rgb_min_db: compared.iter().copied().fold(f64::INFINITY, f64::min).min(100.0),
+            compared: compared.len() as u64,
+            real_frames_changed: changed_real_frames(seen),
+            fill_and_submit_ms: median_ms(&submissions.work),
+            synthesis_ms: count(|counts| counts.synthesis_mean_ns) as f64 / 1e6,
+            backend: "cpu",
+            method: settings.method.name(),
+            scene: settings.scene.name,
+            width: options.size.width,
+            height: options.size.height,
+            key_rate_hz: settings.key_rate_hz,
+            refresh_hz: settings.refresh_hz,
+            out: settings.out.clone(),
+        }
+    }
+
+    /// What happened, in ten lines.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let Self { key_frames, presented, real, synthesised, repeated, dropped, .. } = self;
+        let out = self.out.display();
+        [
+            format!(
+                "`{}` at {} Hz went to a daemon in a second process and came out at {} Hz, {}x{}.",
+                self.scene, self.key_rate_hz, self.refresh_hz, self.width, self.height
+            ),
+            format!("keys submitted      {key_frames}, {} skipped", self.skipped_keys),
+            format!("frames shown        {presented}: {real} real, {synthesised} synthesised ({}), {repeated} repeated", self.method),
+            format!(
+                "frames dropped      {dropped}; after the first second {} ({:.2} % of the in-betweens)",
+                self.dropped_after_first_second, self.dropped_percent
+            ),
+            format!("content judder      {:.4} of a refresh interval", self.content_judder),
+            format!(
+                "error of in-betweens {:.1} dB PSNR on average, {:.1} dB at worst, {} compared",
+                self.psnr_rgb_db, self.psnr_rgb_min_db, self.compared
+            ),
+            format!("real frames changed {}", self.real_frames_changed),
+            format!(
+                "time                {:.2} ms to fill and submit a key, {:.2} ms to make an in-between on the {}",
+                self.fill_and_submit_ms, self.synthesis_ms, self.backend
+            ),
+            format!("look at             {out}/contact-sheet.png and {out}/timeline.png"),
+            format!("numbers             {out}/summary.json"),
+        ]
+        .join("\n")
+    }
+
+    /// Writes the contact sheet, the timeline and the numbers.
+    ///
+    /// # Errors
+    /// If one cannot be drawn or written.
+    pub fn write(
+        &self,
+        settings: &Settings,
+        rehearsal: &Rehearsal,
+        submissions: &Submissions,
+        seen: &Seen,
+    ) -> anyhow::Result<()> {
+        let out = &settings.out;
+        let json = serde_json::to_string_pretty(self)?;
+        let path = out.join("summary.json");
+        fs::write(&path, json + "\n").with_context(|| format!("writing {}", path.display()))?;
+        if let Some(sheet) = self.draw_contact_sheet(rehearsal, &seen.kept)? {
+            save(&sheet, &out.join("contact-sheet.png"))?;
+        }
+        let events = events(submissions, seen, rehearsal);
+        if !events.is_empty() {
+            let title = format!(
+                "{} at {} Hz to {} Hz, {}",
+                self.scene, self.key_rate_hz, self.refresh_hz, self.method
+            );
+            save(&timeline(&title, &events)?, &out.join("timeline.png"))?;
+        }
+        Ok(())
+    }
+
+    fn draw_contact_sheet(
+        &self,
+        rehearsal: &Rehearsal,
+        kept: &[Kept],
+    ) -> anyhow::Result<Option<tiny_skia::Pixmap>> {
+        let truths: Vec<Vec<u8>> =
+            kept.iter().map(|kept| rehearsal.render_truth(kept.shown.content_ns)).collect();
+        let image = |pixels| Rgba8Image::new(self.width, self.height, pixels);
+        let rows = kept.iter().zip(&truths).filter_map(|(kept, truth)| {
+            let shown = &kept.shown;
+            let key = rehearsal.footage.keys.get(usize::try_from(shown.key_index).ok()?)?;
+            Some(ContactSheetRow {
+                label: format!("key {}, phase {:.2}", shown.key_index, shown.phase),
+                detail: format!("{:.1} dB", psnr_rgb_db(&kept.rgba, &without_alpha(truth))),
+                key: image(&key.color)?,
+                in_between: image(&kept.rgba)?,
+                truth: image(truth)?,
+            })
+        });
+        let rows: Vec<_> = rows.collect();
+        if rows.is_empty() {
+            return Ok(None);
+        }
+        let title = format!("{}, {}: in-between frames as shown", self.scene, self.method);
+        Ok(Some(contact_sheet(&title, &rows)?))
+    }
+}
+
+fn save(picture: &tiny_skia::Pixmap, path: &std::path::Path) -> anyhow::Result<()> {
+    picture.save_png(path).with_context(|| format!("writing {}", path.display()))
+}
+
+fn without_alpha(rgba: &[u8]) -> Vec<u8> {
+    rgba.chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect()
+}
+
+/// Decibels of every in-between frame that has a truth: those that fell on a refresh of the
+/// rehearsal, or else those kept for the sheet, whose truth is rendered for it.
+fn compared(seen: &Seen, rehearsal: &Rehearsal) -> Vec<f64> {
+    let is_made = |shown: &&Shown| shown.kind == OutputKind::Synthesised;
+    let on_grid: Vec<f64> =
+        seen.frames.iter().filter(is_made).filter_map(|shown| shown.psnr_rgb_db).collect();
+    if !on_grid.is_empty() {
+        return on_grid;
+    }
+    let against_truth = |kept: &Kept| {
+        psnr_rgb_db(&kept.rgba, &without_alpha(&rehearsal.render_truth(kept.shown.content_ns)))
+    };
+    seen.kept.iter().map(against_truth).collect()
+}
+
+fn changed_real_frames(seen: &Seen) -> u64 {
+    let is_changed = |shown: &&Shown| {
+        shown.kind == OutputKind::Real && shown.psnr_rgb_db.is_some_and(|db| db < 100.0)
+    };
+    seen.frames.iter().filter(is_changed).count() as u64
+}
+
+/// Standard deviation of the content-time step from one output frame to the next, over the refresh
+/// interval. Steps across frames that were not received are left out.
+fn content_judder(frames: &[Shown], refresh_hz: f64) -> f64 {
+    let steps: Vec<f64> = frames
+        .windows(2)
+        .filter(|pair| pair[1].sequence == pair[0].sequence + 1)
+        .map(|pair| (pair[1].content_ns as f64 - pair[0].content_ns as f64) / 1e9 * refresh_hz)
+        .collect();
+    let centre = mean(&steps);
+    let squares: Vec<f64> = steps.iter().map(|step| (step - centre) * (step - centre)).collect();
+    mean(&squares).sqrt()
+}
+
+fn events(submissions: &Submissions, seen: &Seen, rehearsal: &Rehearsal) -> Vec<TimelineEvent> {
+    let Some(first) = seen.frames.first() else { return Vec::new() };
+    let start = first.present_at + TIMELINE_FROM;
+    let at_ms = |time: MonoTime| (time - start).as_ms_f64();
+    let start_content_ns = (start - first.present_at).as_ns() as f64 + first.content_ns as f64;
+    let content_ms = |content_ns: u64| (content_ns as f64 - start_content_ns) / 1e6;
+    let is_drawn = |time: MonoTime| time >= start && time < start + TIMELINE_SPAN;
+    let interval = rehearsal.footage.options.key_interval_ns;
+    let keys = submissions.sent.iter().filter(|(_, sent_at)| is_drawn(*sent_at)).map(
+        |&(index, sent_at)| TimelineEvent::Key {
+            arrived_at_ms: at_ms(sent_at),
+            content_ms: content_ms(index * interval),
+        },
+    );
+    let presents = seen.frames.iter().filter(|shown| is_drawn(shown.present_at)).map(|shown| {
+        TimelineEvent::Present {
+            at_ms: at_ms(shown.present_at),
+            kind: match shown.kind {
+                OutputKind::Real => PresentKind::Real,
+                OutputKind::Synthesised => PresentKind::Synthesised,
+                OutputKind::Repeated => PresentKind::Repeated,
+            },
+            content_ms: Some(content_ms(shown.content_ns)),
+        }
+    });
+    keys.chain(presents).collect()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    if values.is_empty() { 0.0 } else { values.iter().sum::<f64>() / values.len() as f64 }
+}
+
+fn ratio(part: u64, whole: u64) -> f64 {
+    if whole == 0 { 0.0 } else { part as f64 / whole as f64 }
+}
+
+fn median_ms(spans: &[MonoSpan]) -> f64 {
+    let mut sorted = spans.to_vec();
+    sorted.sort_unstable();
+    sorted.get(sorted.len() / 2).map_or(0.0, |span| span.as_ms_f64())
+}
