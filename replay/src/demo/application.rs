@@ -1,11 +1,14 @@
 //! The demo's application: submits each key when its content time has come.
+//!
+//! The fixtures' client decides what to submit; this module waits and keeps the record.
 
 use std::time::Duration;
 
 use anyhow::{Context as _, bail};
-use foreframe_client::{ConnectOptions, Event, Statistics};
+use foreframe_client::{Client, ConnectOptions, Event, Statistics, StreamId};
 use foreframe_engine::{MonoSpan, MonoTime};
-use foreframe_fixtures::{FootageClient, Submitted};
+use foreframe_fixtures::client::{DemoClient, KeyFate, Next, stream_options};
+use foreframe_fixtures::{Recipe, Size};
 use foreframed::clock;
 use indicatif::ProgressBar;
 
@@ -22,7 +25,7 @@ const SETTLED_AFTER: MonoSpan = MonoSpan::from_ms(1000);
 pub struct Submissions {
     /// Key by key: index, and when its submission was done.
     pub sent: Vec<(u64, MonoTime)>,
-    /// Keys for which no slot was free.
+    /// Keys that were left out: no slot was free, or their time had passed.
     pub skipped: u64,
     /// Time to fill and submit each key.
     pub work: Vec<MonoSpan>,
@@ -32,27 +35,26 @@ pub struct Submissions {
     pub settled: Option<Statistics>,
 }
 
-/// A client with footage to submit.
+/// A client with a stream.
 #[derive(Debug)]
 pub struct Application {
-    client: FootageClient,
+    client: Client,
+    stream: StreamId,
     base: MonoTime,
 }
 
 impl Application {
-    /// Connects and creates the stream; the first key is due at `base`.
+    /// Connects and creates a stream of `size`; the first key will be due at `base`.
     ///
     /// # Errors
     /// If the daemon refuses.
-    pub fn connect(
-        options: &ConnectOptions,
-        rehearsal: &Rehearsal,
-        base: MonoTime,
-    ) -> anyhow::Result<Self> {
-        let footage = &rehearsal.footage;
-        let client = FootageClient::connect(options, CONNECT_TIMEOUT, footage, base.as_ns())
-            .context("connecting as the application")?;
-        Ok(Self { client, base })
+    pub fn connect(options: &ConnectOptions, size: Size, base: MonoTime) -> anyhow::Result<Self> {
+        let mut client =
+            options.connect(CONNECT_TIMEOUT).context("connecting as the application")?;
+        let stream = client
+            .create_stream(&stream_options(&Recipe::new(size)))
+            .context("creating the stream")?;
+        Ok(Self { client, stream, base })
     }
 
     /// Submits every key in time, then ends the stream.
@@ -60,36 +62,36 @@ impl Application {
     /// # Errors
     /// If the daemon goes away or finds fault with something.
     pub fn play(mut self, rehearsal: &Rehearsal, bar: &ProgressBar) -> anyhow::Result<Submissions> {
-        let footage = &rehearsal.footage;
+        let mut demo = DemoClient::new(self.stream, &rehearsal.keys, self.base.as_ns());
         let mut done = Submissions::default();
-        for index in 0..footage.keys.len() as u64 {
-            let due_at = MonoTime::from_ns(self.client.content_time_ns(footage, index));
-            clock::sleep_until(due_at);
+        let mut next = Next::At(self.base.as_ns());
+        while let Next::At(due_ns) = next {
+            clock::sleep_until(MonoTime::from_ns(due_ns));
             let started_at = clock::now();
-            match self.client.submit(footage, index).context("submitting a key frame")? {
-                Submitted::Sent => {
-                    let sent_at = clock::now();
-                    done.work.push(sent_at - started_at);
-                    done.sent.push((index, sent_at));
-                }
-                Submitted::Skipped => done.skipped += 1,
+            next = demo
+                .advance(&mut self.client, started_at.as_ns())
+                .context("submitting a key frame")?;
+            if demo.fates().last() == Some(&KeyFate::Submitted) {
+                let sent_at = clock::now();
+                done.work.push(sent_at - started_at);
+                done.sent.push((demo.fates().len() as u64 - 1, sent_at));
             }
             self.look_at_events()?;
-            if done.settled.is_none() && due_at - self.base >= SETTLED_AFTER {
-                let stream = self.client.stream();
-                done.settled = self.client.client_mut().statistics(stream);
+            if done.settled.is_none() && started_at - self.base >= SETTLED_AFTER {
+                done.settled = self.client.statistics(self.stream);
             }
-            bar.inc(1);
+            bar.set_position(demo.fates().len() as u64);
         }
-        let last = self.client.content_time_ns(footage, footage.keys.len() as u64);
-        clock::sleep_until(MonoTime::from_ns(last));
+        done.skipped = demo.fates().len() as u64 - done.sent.len() as u64;
+        let end_ns = rehearsal.keys.len() as u64 * rehearsal.key_interval_ns;
+        clock::sleep_until(MonoTime::from_ns(self.base.as_ns() + end_ns));
         self.end(&mut done)?;
         Ok(done)
     }
 
     fn look_at_events(&mut self) -> anyhow::Result<bool> {
         let mut has_ended = false;
-        while let Some(event) = self.client.client_mut().next_event() {
+        while let Some(event) = self.client.next_event() {
             match event {
                 Event::Refused(error) => {
                     bail!("the daemon expected {}, found {}", error.expected, error.found)
@@ -102,14 +104,13 @@ impl Application {
     }
 
     fn end(&mut self, done: &mut Submissions) -> anyhow::Result<()> {
-        let stream = self.client.stream();
-        self.client.client_mut().destroy_stream(stream).context("ending the stream")?;
+        self.client.destroy_stream(self.stream).context("ending the stream")?;
         while !self.look_at_events()? {
-            if !self.client.client_mut().wait(END_TIMEOUT)? {
+            if !self.client.wait(END_TIMEOUT)? {
                 bail!("expected the stream to end within {END_TIMEOUT:?}, found that it goes on");
             }
         }
-        done.statistics = self.client.client_mut().statistics(stream);
+        done.statistics = self.client.statistics(self.stream);
         Ok(())
     }
 }

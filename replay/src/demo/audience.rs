@@ -115,22 +115,21 @@ impl Audience {
         seen.frames.push(shown);
         seen.not_received = frame.skipped();
         if shown.kind == OutputKind::Synthesised {
-            self.keep(shown, rehearsal, pixels, seen);
+            keep(shown, rehearsal, pixels, seen);
         }
         Ok(())
     }
+}
 
-    #[expect(clippy::cast_precision_loss, reason = "a show lasts seconds, far below 2^53 ns")]
-    fn keep(&self, shown: Shown, rehearsal: &Rehearsal, pixels: &[u8], seen: &mut Seen) {
-        let options = &rehearsal.footage.options;
-        let duration_ns = options.key_interval_ns * u64::from(options.keys);
-        let Some(due) = KEPT_AT.get(seen.kept.len()) else { return };
-        // Rows take turns between the frames right after a key and the last ones before the next.
-        let wants_late = seen.kept.len() % 2 == 1;
-        if shown.content_ns as f64 >= due * duration_ns as f64 && (shown.phase >= 0.5) == wants_late
-        {
-            seen.kept.push(Kept { shown, rgba: pixels.to_vec() });
-        }
+/// Keeps an in-between frame if the next one for the contact sheet is due.
+#[expect(clippy::cast_precision_loss, reason = "a show lasts seconds, far below 2^53 ns")]
+fn keep(shown: Shown, rehearsal: &Rehearsal, pixels: &[u8], seen: &mut Seen) {
+    let Some(due) = KEPT_AT.get(seen.kept.len()) else { return };
+    let duration_ns = rehearsal.key_interval_ns * rehearsal.keys.len() as u64;
+    // Rows take turns between the frames right after a key and the last ones before the next.
+    let wants_late = seen.kept.len() % 2 == 1;
+    if shown.content_ns as f64 >= due * duration_ns as f64 && (shown.phase >= 0.5) == wants_late {
+        seen.kept.push(Kept { shown, rgba: pixels.to_vec() });
     }
 }
 

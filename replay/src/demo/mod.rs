@@ -68,8 +68,8 @@ pub fn run(settings: &Settings, output: &Output) -> anyhow::Result<Summary> {
     let connect = || ConnectOptions::new("foreframe demo").socket(daemon.socket());
 
     let audience = Audience::connect(&connect(), base)?;
-    let application = Application::connect(&connect(), &rehearsal, base)?;
-    let show = output.progress("showing", rehearsal.footage.keys.len() as u64);
+    let application = Application::connect(&connect(), settings.size, base)?;
+    let show = output.progress("showing", rehearsal.keys.len() as u64);
     let is_over = AtomicBool::new(false);
     let (submissions, shown) = thread::scope(|scope| {
         let is_over = &is_over;

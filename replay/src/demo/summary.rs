@@ -90,7 +90,6 @@ impl Summary {
         let dropped = settled(|counts| counts.dropped);
         let planned = settled(|counts| counts.synthesised) + dropped;
         let compared: Vec<f64> = compared(seen, rehearsal);
-        let options = &rehearsal.footage.options;
         Self {
             key_frames: submissions.sent.len() as u64,
             skipped_keys: submissions.skipped,
@@ -111,8 +110,8 @@ impl Summary {
             backend: "cpu",
             method: settings.method.name(),
             scene: settings.scene.name,
-            width: options.size.width,
-            height: options.size.height,
+            width: settings.size.width,
+            height: settings.size.height,
             key_rate_hz: settings.key_rate_hz,
             refresh_hz: settings.refresh_hz,
             out: settings.out.clone(),
@@ -190,11 +189,11 @@ impl Summary {
         let image = |pixels| Rgba8Image::new(self.width, self.height, pixels);
         let rows = kept.iter().zip(&truths).filter_map(|(kept, truth)| {
             let shown = &kept.shown;
-            let key = rehearsal.footage.keys.get(usize::try_from(shown.key_index).ok()?)?;
+            let key = rehearsal.keys.get(usize::try_from(shown.key_index).ok()?)?;
             Some(ContactSheetRow {
                 label: format!("key {}, phase {:.2}", shown.key_index, shown.phase),
                 detail: format!("{:.1} dB", psnr_rgb_db(&kept.rgba, &without_alpha(truth))),
-                key: image(&key.color)?,
+                key: image(&key.color.rgba)?,
                 in_between: image(&kept.rgba)?,
                 truth: image(truth)?,
             })
@@ -258,7 +257,7 @@ fn events(submissions: &Submissions, seen: &Seen, rehearsal: &Rehearsal) -> Vec<
     let start_content_ns = (start - first.present_at).as_ns() as f64 + first.content_ns as f64;
     let content_ms = |content_ns: u64| (content_ns as f64 - start_content_ns) / 1e6;
     let is_drawn = |time: MonoTime| time >= start && time < start + TIMELINE_SPAN;
-    let interval = rehearsal.footage.options.key_interval_ns;
+    let interval = rehearsal.key_interval_ns;
     let keys = submissions.sent.iter().filter(|(_, sent_at)| is_drawn(*sent_at)).map(
         |&(index, sent_at)| TimelineEvent::Key {
             arrived_at_ms: at_ms(sent_at),
