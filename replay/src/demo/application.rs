@@ -29,9 +29,9 @@ pub struct Submissions {
     pub skipped: u64,
     /// Time to fill and submit each key.
     pub work: Vec<MonoSpan>,
-    /// The daemon's counts at the end.
+    /// The newest counts of the daemon: in the end, those of the whole show.
     pub statistics: Option<Statistics>,
-    /// The daemon's counts after the first second.
+    /// The last counts of the first second.
     pub settled: Option<Statistics>,
 }
 
@@ -76,9 +76,9 @@ impl Application {
                 done.work.push(sent_at - started_at);
                 done.sent.push((demo.fates().len() as u64 - 1, sent_at));
             }
-            self.look_at_events()?;
-            if done.settled.is_none() && started_at - self.base >= SETTLED_AFTER {
-                done.settled = self.client.statistics(self.stream);
+            self.look_at_events(&mut done)?;
+            if started_at - self.base < SETTLED_AFTER {
+                done.settled = done.statistics;
             }
             bar.set_position(demo.fates().len() as u64);
         }
@@ -89,13 +89,15 @@ impl Application {
         Ok(done)
     }
 
-    fn look_at_events(&mut self) -> anyhow::Result<bool> {
+    /// True if the stream has ended.
+    fn look_at_events(&mut self, done: &mut Submissions) -> anyhow::Result<bool> {
         let mut has_ended = false;
         while let Some(event) = self.client.next_event() {
             match event {
                 Event::Refused(error) => {
                     bail!("the daemon expected {}, found {}", error.expected, error.found)
                 }
+                Event::Statistics(statistics) => done.statistics = Some(statistics),
                 Event::StreamEnded { .. } => has_ended = true,
                 _ => {}
             }
@@ -105,12 +107,11 @@ impl Application {
 
     fn end(&mut self, done: &mut Submissions) -> anyhow::Result<()> {
         self.client.destroy_stream(self.stream).context("ending the stream")?;
-        while !self.look_at_events()? {
+        while !self.look_at_events(done)? {
             if !self.client.wait(END_TIMEOUT)? {
                 bail!("expected the stream to end within {END_TIMEOUT:?}, found that it goes on");
             }
         }
-        done.statistics = self.client.statistics(self.stream);
         Ok(())
     }
 }

@@ -22,8 +22,6 @@ const KEPT_AT: [f64; 4] = [0.37, 0.55, 0.73, 0.91];
 pub struct Shown {
     /// How it came to be.
     pub kind: OutputKind,
-    /// Counts output frames, those that were not received included.
-    pub sequence: u64,
     /// The key that it was made from.
     pub key_index: u64,
     /// Position after that key.
@@ -32,6 +30,8 @@ pub struct Shown {
     pub content_ns: u64,
     /// When it was planned to be shown.
     pub present_at: MonoTime,
+    /// Frames before it that were made while all slots of the subscription were in use.
+    pub not_received: u64,
     /// Against the truth of its content time, if that was rendered.
     pub psnr_rgb_db: Option<f64>,
 }
@@ -52,8 +52,6 @@ pub struct Seen {
     pub frames: Vec<Shown>,
     /// A few in-between frames.
     pub kept: Vec<Kept>,
-    /// Frames that were made while all slots of the subscription were in use.
-    pub not_received: u64,
 }
 
 /// A client that watches.
@@ -105,15 +103,14 @@ impl Audience {
         let truth = rehearsal.rendered_truth(content_ns);
         let shown = Shown {
             kind: frame.kind(),
-            sequence: frame.sequence(),
             key_index: frame.key_index(),
             phase: f64::from(frame.phase_q12()) / 4096.0,
             content_ns,
             present_at: MonoTime::from_ns(frame.present_at_ns()),
+            not_received: frame.skipped(),
             psnr_rgb_db: truth.map(|truth| psnr_rgb_db(pixels, truth)),
         };
         seen.frames.push(shown);
-        seen.not_received = frame.skipped();
         if shown.kind == OutputKind::Synthesised {
             keep(shown, rehearsal, pixels, seen);
         }
@@ -126,9 +123,12 @@ impl Audience {
 fn keep(shown: Shown, rehearsal: &Rehearsal, pixels: &[u8], seen: &mut Seen) {
     let Some(due) = KEPT_AT.get(seen.kept.len()) else { return };
     let duration_ns = rehearsal.key_interval_ns * rehearsal.keys.len() as u64;
-    // Rows take turns between the frames right after a key and the last ones before the next.
+    // Rows take turns between the frames right after a key and the last ones before the next, if
+    // such a frame comes within a few keys.
     let wants_late = seen.kept.len() % 2 == 1;
-    if shown.content_ns as f64 >= due * duration_ns as f64 && (shown.phase >= 0.5) == wants_late {
+    let late_by_ns = shown.content_ns as f64 - due * duration_ns as f64;
+    let is_wanted = (shown.phase >= 0.5) == wants_late;
+    if late_by_ns >= 0.0 && (is_wanted || late_by_ns > 3.0 * rehearsal.key_interval_ns as f64) {
         seen.kept.push(Kept { shown, rgba: pixels.to_vec() });
     }
 }

@@ -237,14 +237,20 @@ fn changed_real_frames(seen: &Seen) -> u64 {
     seen.frames.iter().filter(is_changed).count() as u64
 }
 
-/// Standard deviation of the content-time step from one output frame to the next, over the refresh
-/// interval. Steps across frames that were not received are left out.
+/// Standard deviation of the content-time step from one refresh to the next, over the refresh
+/// interval. A refresh without a new picture shows the last one again: a step of 0. Pictures that
+/// were shown but not received leave the steps around them out.
 fn content_judder(frames: &[Shown], refresh_hz: f64) -> f64 {
-    let steps: Vec<f64> = frames
-        .windows(2)
-        .filter(|pair| pair[1].sequence == pair[0].sequence + 1)
-        .map(|pair| (pair[1].content_ns as f64 - pair[0].content_ns as f64) / 1e9 * refresh_hz)
-        .collect();
+    let mut steps = Vec::new();
+    for pair in frames.windows(2) {
+        let refreshes = (pair[1].present_at - pair[0].present_at).as_secs_f64() * refresh_hz;
+        let step = (pair[1].content_ns as f64 - pair[0].content_ns as f64) / 1e9 * refresh_hz;
+        if pair[1].not_received == pair[0].not_received {
+            let repeats = (refreshes.round() - 1.0).max(0.0) as usize;
+            steps.extend(std::iter::repeat_n(0.0, repeats));
+            steps.push(step);
+        }
+    }
     let centre = mean(&steps);
     let squares: Vec<f64> = steps.iter().map(|step| (step - centre) * (step - centre)).collect();
     mean(&squares).sqrt()
@@ -290,4 +296,44 @@ fn median_ms(spans: &[MonoSpan]) -> f64 {
     let mut sorted = spans.to_vec();
     sorted.sort_unstable();
     sorted.get(sorted.len() / 2).map_or(0.0, |span| span.as_ms_f64())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use foreframe_engine::MonoSpan;
+
+    /// Frames shown at the given refreshes of a 100 Hz display, content times in ms.
+    fn shown(frames: &[(i64, u64)]) -> Vec<Shown> {
+        let frame = |&(refresh, content_ms): &(i64, u64)| Shown {
+            kind: OutputKind::Synthesised,
+            key_index: 0,
+            phase: 0.0,
+            content_ns: content_ms * 1_000_000,
+            present_at: MonoTime::ZERO + MonoSpan::from_ms(10 * refresh),
+            not_received: 0,
+            psnr_rgb_db: None,
+        };
+        frames.iter().map(frame).collect()
+    }
+
+    #[test]
+    fn even_steps_have_no_judder() {
+        assert!(content_judder(&shown(&[(0, 0), (1, 10), (2, 20), (3, 30)]), 100.0) < 1e-9);
+    }
+
+    #[test]
+    fn a_refresh_that_repeats_a_picture_is_judder() {
+        let judder = content_judder(&shown(&[(0, 0), (1, 10), (3, 30), (4, 40)]), 100.0);
+        let expected = (0.5_f64).sqrt();
+        assert!((judder - expected).abs() < 1e-9, "steps 1, 0, 2, 1: found {judder}");
+    }
+
+    #[test]
+    fn steps_around_frames_that_were_not_received_do_not_count() {
+        let mut frames = shown(&[(0, 0), (1, 10), (3, 30), (4, 40)]);
+        frames[2].not_received = 1;
+        frames[3].not_received = 1;
+        assert!(content_judder(&frames, 100.0) < 1e-9);
+    }
 }
