@@ -110,9 +110,12 @@ fn side_car(
     }
 }
 
+/// The channels of one part.
+type Channels = Vec<AnyChannel<FlatSamples>>;
+
 fn write_image(frame: &CapturedFrame, format: &StreamFormat, path: &Path) -> anyhow::Result<()> {
     // Planes of one size share a part; colour's comes first.
-    let mut parts: Vec<((u32, u32), Vec<AnyChannel<FlatSamples>>)> = Vec::new();
+    let mut parts: Vec<((u32, u32), Channels)> = Vec::new();
     for plane in &frame.planes {
         let size = (plane.info.width, plane.info.height);
         let channels = plane_channels(plane, format);
