@@ -40,7 +40,10 @@ const ARROWS: [(&str, &[&str]); 8] = [
 ];
 
 fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().unwrap()
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("..")
+        .canonicalize()
+        .expect("the repository is there")
 }
 
 /// The arrows between workspace packages that cargo sees, development dependencies included.
@@ -50,7 +53,7 @@ fn found_arrows() -> BTreeMap<String, BTreeSet<String>> {
         .no_deps()
         .other_options(vec!["--offline".to_owned()])
         .exec()
-        .unwrap();
+        .expect("cargo reads the workspace");
     let names: BTreeSet<String> =
         metadata.packages.iter().map(|package| package.name.to_string()).collect();
     metadata

@@ -368,7 +368,7 @@ fn what_is_wrong_with_a_folder_is_said_with_file_expected_and_found() {
         ),
         (
             |dir| {
-                std::fs::rename(dir.join("frame_0003.json"), dir.join("frame_0009.json")).unwrap()
+                std::fs::rename(dir.join("frame_0003.json"), dir.join("frame_0009.json")).unwrap();
             },
             &["expected frame 9", "found 3"],
         ),
