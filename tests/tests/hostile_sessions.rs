@@ -34,10 +34,10 @@ impl Witness {
     }
 }
 
-/// Runs one attack per line on a connection of its own, and expects a fatal error of this kind.
 /// What an attack is called, the error that answers it, and the attack.
 type Attack<'a> = (&'a str, ErrorCode, &'a dyn Fn(&mut Client));
 
+/// Runs one attack per line on a connection of its own, and expects a fatal error of this kind.
 fn expect_fatal(attacks: &[Attack<'_>]) {
     let daemon = RunningDaemon::start("shm");
     let mut witness = Witness::new(&daemon);
