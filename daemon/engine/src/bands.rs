@@ -1,10 +1,14 @@
 //! Shares rows among threads. Which thread makes a row never changes what is in it.
+//!
+//! Rows are made with the widest registers there are ([`crate::simd`]): mark the closures
+//! `#[inline(always)]`.
 
 use rayon::ThreadPool;
 use rayon::iter::{IndexedParallelIterator, ParallelIterator};
 use rayon::slice::ParallelSliceMut;
 
 use crate::plane::Plane;
+use crate::simd::widest;
 
 /// Rows that one piece of work has at least: waking a thread for fewer costs more than it saves.
 const MIN_ROWS: usize = 8;
@@ -32,15 +36,20 @@ pub fn for_each_chunk<T: Send>(
     }
     if pool.current_num_threads() == 1 || data.len() <= MIN_ROWS * length {
         for (y, part) in data.chunks_mut(length).enumerate() {
-            chunk(y as u32, part);
+            widest(
+                #[inline(always)]
+                || chunk(y as u32, part),
+            );
         }
         return;
     }
     pool.install(|| {
-        data.par_chunks_mut(length)
-            .enumerate()
-            .with_min_len(MIN_ROWS)
-            .for_each(|(y, part)| chunk(y as u32, part));
+        data.par_chunks_mut(length).enumerate().with_min_len(MIN_ROWS).for_each(|(y, part)| {
+            widest(
+                #[inline(always)]
+                || chunk(y as u32, part),
+            );
+        });
     });
 }
 
@@ -60,6 +69,11 @@ pub fn for_each_band<A: Send, B: Send>(
     }
     pool.install(|| {
         let parts = a.data_mut().par_chunks_mut(length).zip(b.data_mut().par_chunks_mut(length));
-        parts.enumerate().for_each(|(i, (a, b))| band((i * rows) as u32, a, b));
+        parts.enumerate().for_each(|(i, (a, b))| {
+            widest(
+                #[inline(always)]
+                || band((i * rows) as u32, a, b),
+            );
+        });
     });
 }

@@ -70,6 +70,14 @@ pub trait Texel: Copy + Default + PartialEq + Send + Sync + 'static {
     #[must_use]
     fn mix(a: Self, b: Self, weight: u32) -> Self;
 
+    /// [`Texel::bilinear`] of pixels `i` and `i + 1` of `top` and `bottom` into each `out[i]`.
+    #[inline(always)]
+    fn bilinear_run(top: &[Self], bottom: &[Self], fx: u32, fy: u32, out: &mut [Self]) {
+        for (texel, (top, bottom)) in out.iter_mut().zip(top.windows(2).zip(bottom.windows(2))) {
+            *texel = Self::bilinear([top[0], top[1], bottom[0], bottom[1]], fx, fy);
+        }
+    }
+
     /// [`sample`] at each of the Q8 positions `xs`, `ys` into `out`, all of the same length.
     fn sample_each(plane: &Plane<Self>, valid: Rect, xs: &[i32], ys: &[i32], out: &mut [Self]) {
         for (texel, (&x, &y)) in out.iter_mut().zip(xs.iter().zip(ys)) {
@@ -131,6 +139,19 @@ impl Texel for Rgba8 {
 
     fn mix(a: Self, b: Self, weight: u32) -> Self {
         Self(packed_channels([a.0, b.0], RGBA8_FIELDS, |c| mix_channel(c, weight)))
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    fn bilinear_run(top: &[Self], bottom: &[Self], fx: u32, fy: u32, out: &mut [Self]) {
+        let done = if is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2, asked for just above.
+            unsafe { avx2::bilinear_run(top, bottom, fx, fy, out) }
+        } else {
+            0
+        };
+        for i in done..out.len() {
+            out[i] = Self::bilinear([top[i], top[i + 1], bottom[i], bottom[i + 1]], fx, fy);
+        }
     }
 
     #[cfg(target_arch = "x86_64")]
@@ -293,6 +314,7 @@ pub const fn ordered_to_half(ordered: u16) -> u16 {
 mod tests {
     use super::*;
     use crate::testing::hash;
+    use crate::warp::sample::sample_run;
     use proptest::prelude::*;
 
     proptest! {
@@ -324,6 +346,31 @@ mod tests {
             let mut out = vec![Rgba8::default(); xs.len()];
             Rgba8::sample_each(&plane, valid, &xs, &ys, &mut out);
             for ((x, y), texel) in positions.into_iter().zip(out) {
+                prop_assert_eq!(texel, sample(&plane, valid, x, y), "at {}, {}", x, y);
+            }
+        }
+
+        #[test]
+        fn sampling_a_run_equals_sampling_one_by_one(
+            (width, height) in (1_u32..40, 1_u32..20),
+            (left, top) in (0_u32..4, 0_u32..4),
+            (x, y) in (-900..9000_i32, -900..6000_i32),
+            whole in 0..3,
+            count in 0_usize..30,
+            seed: u32,
+        ) {
+            let ColorPlane::Rgba8(plane) =
+                crate::testing::noise(ColorFormat::Rgba8, width + left + 1, height + top, seed)
+            else {
+                unreachable!("the format asked for")
+            };
+            let valid = Rect { x: left, y: top, width, height };
+            // Some runs lie on columns, and some of those on a row too.
+            let x = if whole > 0 { x & !0xff } else { x };
+            let y = if whole > 1 { y & !0xff } else { y };
+            let mut out = vec![Rgba8::default(); count];
+            sample_run(&plane, valid, [x, y], &mut out);
+            for (x, texel) in (x..).step_by(256).zip(out) {
                 prop_assert_eq!(texel, sample(&plane, valid, x, y), "at {}, {}", x, y);
             }
         }

@@ -24,7 +24,7 @@ pub struct FieldAxis {
     offset: i32,
     centre: Vec<i32>,
     cell: Vec<u16>,
-    before: Vec<(u16, u16)>,
+    before: Vec<[u16; 2]>,
 }
 
 /// Both axes of the map between one valid rectangle and one field grid.
@@ -66,7 +66,7 @@ impl FieldAxis {
             let place = (256 * pixel + 128 - i64::from(offset)) * count;
             self.cell.push(place.div_euclid(256 * span).clamp(0, last) as u16);
             let between = (place.div_euclid(span) - 128).clamp(0, last * 256);
-            self.before.push(((between >> 8) as u16, (between & 0xff) as u16));
+            self.before.push([(between >> 8) as u16, (between & 0xff) as u16]);
         }
     }
 
@@ -104,8 +104,14 @@ impl FieldAxis {
     /// way to the next one in 1/256 (3). The way is 0 wherever there is no next one.
     #[must_use]
     pub fn before(&self, index: u32) -> (u32, u32) {
-        let (cell, way) = self.before[index as usize];
+        let [cell, way] = self.before[index as usize];
         (u32::from(cell), u32::from(way))
+    }
+
+    /// [`Self::before`] of `count` pixels from `index` on: cell and way.
+    #[must_use]
+    pub fn before_each(&self, index: u32, count: usize) -> &[[u16; 2]] {
+        &self.before[index as usize..][..count]
     }
 }
 

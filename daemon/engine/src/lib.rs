@@ -24,6 +24,7 @@ pub mod method;
 pub mod pacing;
 pub mod phase;
 pub mod plane;
+mod simd;
 #[cfg(test)]
 mod testing;
 pub mod time;

@@ -78,6 +78,34 @@ pub(super) fn sample_eight(
     unsafe { _mm256_storeu_si256(out.as_mut_ptr().cast(), pixels) };
 }
 
+/// The mean of pixels `i` and `i + 1` of `top` and `bottom` at `fx`, `fy` into each `out[i]`, as
+/// many as whole steps hold; returns their number.
+#[target_feature(enable = "avx2")]
+pub(super) fn bilinear_run(
+    top: &[Rgba8],
+    bottom: &[Rgba8],
+    fx: u32,
+    fy: u32,
+    out: &mut [Rgba8],
+) -> usize {
+    let ways = [fx, fy].map(|way| _mm256_set1_epi32(way.cast_signed()));
+    let (eights, _) = out.as_chunks_mut::<LANES>();
+    for (i, out) in eights.iter_mut().enumerate() {
+        let row = |row: &[Rgba8]| {
+            let nine = &row[i * LANES..][..=LANES];
+            // SAFETY: both loads are of 8 of the 9 pixels of 32 bits, and need no alignment.
+            unsafe {
+                let left = _mm256_loadu_si256(nine.as_ptr().cast());
+                across(left, _mm256_loadu_si256(nine.as_ptr().add(1).cast()), ways[0])
+            }
+        };
+        let pixels = down([row(top), row(bottom)], ways[1]);
+        // SAFETY: `out` holds 8 pixels of 32 bits, and the store needs no alignment.
+        unsafe { _mm256_storeu_si256(out.as_mut_ptr().cast(), pixels) };
+    }
+    eights.len() * LANES
+}
+
 /// Interpolates to the right: 16 bits per channel, the low and the high two pixels of each half.
 #[inline]
 #[target_feature(enable = "avx2")]

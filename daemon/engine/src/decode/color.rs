@@ -69,12 +69,17 @@ fn read<T: Texel, const N: usize>(
     target: &mut Plane<T>,
     texel: impl Fn([u8; N]) -> T + Sync,
 ) {
-    for_each_row(pool, target, |y, row| {
-        let (pixels, _) = plane.row(y).as_chunks::<N>();
-        for (to, from) in row.iter_mut().zip(pixels) {
-            *to = texel(*from);
-        }
-    });
+    for_each_row(
+        pool,
+        target,
+        #[inline(always)]
+        |y, row| {
+            let (pixels, _) = plane.row(y).as_chunks::<N>();
+            for (to, from) in row.iter_mut().zip(pixels) {
+                *to = texel(*from);
+            }
+        },
+    );
 }
 
 fn ordered_from_bytes(bytes: [u8; 8]) -> OrderedRgba16 {
@@ -101,10 +106,15 @@ fn stretch_to<T: Texel>(pool: &ThreadPool, from: &Plane<T>, valid: Rect, to: &mu
         let within = u64::from(2 * index + 1) * 256 * u64::from(length) / (2 * u64::from(target));
         i32::try_from(u64::from(start) * 256 + within).expect("8192 pixels in Q8 fit 21 bits") - 128
     };
-    for_each_row(pool, to, |y, row| {
-        let from_y = position(y, height, valid.y, valid.height);
-        for (x, texel) in (0..).zip(row) {
-            *texel = sample(from, valid, position(x, width, valid.x, valid.width), from_y);
-        }
-    });
+    for_each_row(
+        pool,
+        to,
+        #[inline(always)]
+        |y, row| {
+            let from_y = position(y, height, valid.y, valid.height);
+            for (x, texel) in (0..).zip(row) {
+                *texel = sample(from, valid, position(x, width, valid.x, valid.width), from_y);
+            }
+        },
+    );
 }

@@ -52,6 +52,7 @@ impl DepthToKey {
     /// The key of a stored value.
     #[expect(clippy::cast_possible_truncation, reason = "float to int casts saturate, NaN is 0")]
     #[expect(clippy::cast_sign_loss, reason = "float to int casts saturate")]
+    #[inline(always)]
     pub(super) fn key(self, stored: f64) -> u32 {
         let fraction = match self {
             Self::Buffer { scale, offset } => scale * stored + offset,
@@ -63,6 +64,7 @@ impl DepthToKey {
 }
 
 /// Reads one stored value; integers are normalised to 0..1.
+#[inline(always)]
 pub(super) fn stored_depth(format: DepthFormat, row: &[u8], x: usize) -> f64 {
     match format {
         DepthFormat::F32 => f64::from(f32::from_le_bytes(bytes(row, x))),
@@ -88,6 +90,7 @@ pub(super) fn clip_depth(
     depth as f32
 }
 
+#[inline(always)]
 fn bytes<const N: usize>(row: &[u8], x: usize) -> [u8; N] {
     row.as_chunks::<N>().0[x]
 }

@@ -126,12 +126,17 @@ impl<'a> FieldInput<'a> {
         // One loop per format: the compiler then sees a constant format inside it.
         macro_rules! read {
             ($format:expr) => {
-                for_each_row(self.pool, keys, |y, out| {
-                    let row = plane.valid_row(u32::from(rows[y as usize]));
-                    for (key, &x) in out.iter_mut().zip(columns) {
-                        *key = to_key.key(stored_depth($format, row, usize::from(x)));
-                    }
-                })
+                for_each_row(
+                    self.pool,
+                    keys,
+                    #[inline(always)]
+                    |y, out| {
+                        let row = plane.valid_row(u32::from(rows[y as usize]));
+                        for (key, &x) in out.iter_mut().zip(columns) {
+                            *key = to_key.key(stored_depth($format, row, usize::from(x)));
+                        }
+                    },
+                )
             };
         }
         match convention.format {
@@ -158,13 +163,18 @@ impl<'a> FieldInput<'a> {
         out.resize(self.cells[0], self.cells[1]);
         macro_rules! read {
             ($format:expr) => {
-                for_each_row(self.pool, out, |y, out| {
-                    let row = plane.valid_row(u32::from(rows[y as usize]));
-                    for (displacement, &x) in out.iter_mut().zip(table) {
-                        let [dx, dy] = stored_motion($format, row, usize::from(x));
-                        *displacement = [dx * factor[0], dy * factor[1]];
-                    }
-                })
+                for_each_row(
+                    self.pool,
+                    out,
+                    #[inline(always)]
+                    |y, out| {
+                        let row = plane.valid_row(u32::from(rows[y as usize]));
+                        for (displacement, &x) in out.iter_mut().zip(table) {
+                            let [dx, dy] = stored_motion($format, row, usize::from(x));
+                            *displacement = [dx * factor[0], dy * factor[1]];
+                        }
+                    },
+                )
             };
         }
         match convention.format {
@@ -189,17 +199,22 @@ impl<'a> FieldInput<'a> {
         self.tables(&plane, columns);
         let [table, rows] = &*columns;
         let cells = self.cells.map(|cells| cells as f32);
-        for_each_row(self.pool, out, |y, out| {
-            let row = plane.valid_row(u32::from(rows[y as usize]));
-            let v = (y as f32 + 0.5 + self.jitter[1]) / cells[1];
-            for (x, displacement) in out.iter_mut().enumerate() {
-                let u = (x as f32 + 0.5 + self.jitter[0]) / cells[0];
-                let stored = stored_depth(convention.format, row, usize::from(table[x]));
-                let z = clip_depth(convention, self.projection, stored);
-                let [dx, dy] = motion.displacement(u, v, z);
-                *displacement = [displacement[0] + dx, displacement[1] + dy];
-            }
-        });
+        for_each_row(
+            self.pool,
+            out,
+            #[inline(always)]
+            |y, out| {
+                let row = plane.valid_row(u32::from(rows[y as usize]));
+                let v = (y as f32 + 0.5 + self.jitter[1]) / cells[1];
+                for (x, displacement) in out.iter_mut().enumerate() {
+                    let u = (x as f32 + 0.5 + self.jitter[0]) / cells[0];
+                    let stored = stored_depth(convention.format, row, usize::from(table[x]));
+                    let z = clip_depth(convention, self.projection, stored);
+                    let [dx, dy] = motion.displacement(u, v, z);
+                    *displacement = [displacement[0] + dx, displacement[1] + dy];
+                }
+            },
+        );
         Ok(())
     }
 }

@@ -30,6 +30,7 @@ pub(super) fn pixels_per_unit(
 }
 
 /// Reads one stored vector.
+#[inline(always)]
 pub(super) fn stored_motion(format: MotionFormat, row: &[u8], x: usize) -> [f32; 2] {
     match format {
         MotionFormat::Rg16f => {
@@ -47,6 +48,7 @@ pub(super) fn stored_motion(format: MotionFormat, row: &[u8], x: usize) -> [f32;
 ///
 /// Moving the exponent and mantissa into place and scaling by 2^112 corrects the exponent's bias
 /// and makes subnormal halves normal, both exactly, without a branch.
+#[inline(always)]
 fn f32_from_half(bits: u32) -> f32 {
     let magnitude = f32::from_bits((bits & 0x7fff) << 13) * f32::from_bits((127 + 112) << 23);
     let poison = if bits & 0x7c00 == 0x7c00 { f32::NAN } else { 0.0 };

@@ -20,6 +20,27 @@ pub fn sample<T: Texel>(plane: &Plane<T>, valid: Rect, x: i32, y: i32) -> T {
     T::bilinear([top[left], top[right], bottom[left], bottom[right]], fx, fy)
 }
 
+/// [`sample`] at (`x + 256 i`, `y`) into each `out[i]`.
+#[inline(always)]
+pub fn sample_run<T: Texel>(plane: &Plane<T>, valid: Rect, [x, y]: [i32; 2], out: &mut [T]) {
+    let (top, bottom, fy) = neighbours(y, valid.y, valid.height);
+    let fx = (x & 0xff).cast_unsigned();
+    let count = out.len() + usize::from(fx | fy != 0);
+    let start = usize::try_from((x >> 8) - valid.x.cast_signed()).ok();
+    let Some(start) = start.filter(|start| start + count <= valid.width as usize) else {
+        for (x, texel) in (x..).step_by(256).zip(out) {
+            *texel = sample(plane, valid, x, y);
+        }
+        return;
+    };
+    let columns = |y: u32| &plane.row(y)[valid.x as usize + start..][..count];
+    if fx | fy == 0 {
+        out.copy_from_slice(columns(top));
+    } else {
+        T::bilinear_run(columns(top), columns(bottom), fx, fy, out);
+    }
+}
+
 /// The two pixels around a Q8 position inside `start..start + length`, and the way between them.
 #[expect(clippy::cast_sign_loss, reason = "clamped to 0 and above before the cast")]
 #[expect(clippy::cast_possible_wrap, reason = "planes are at most 8192 pixels wide and high")]

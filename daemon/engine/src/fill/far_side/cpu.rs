@@ -31,49 +31,56 @@ pub fn far_side(
     pool.install(|| {
         rayon::join(|| sweep(splat, 0..height, above), || sweep(splat, (0..height).rev(), below))
     });
-    for_each_row(pool, far, |y, row| {
-        let splats = splat.row(y);
-        let mut left = None;
-        let mut x = 0;
-        while x < width {
-            if splats[x as usize] != NO_SOURCE {
-                left = Some(x);
-                x += 1;
-                continue;
-            }
-            let run = splats[x as usize..].iter().take_while(|splat| **splat == NO_SOURCE);
-            let end = x + u32::try_from(run.count()).expect("a row has at most 8192 cells");
-            let right = (end < width).then_some(end);
-            for hole in x..end {
-                let side = |cell: u32, way: u32| Side { cell, way };
-                let beside = Sides {
-                    first: left.map(|left| side(y * width + left, hole - left)),
-                    second: right.map(|right| side(y * width + right, right - hole)),
-                };
-                let vertical = |row: u16| {
-                    let row = u32::from(row);
-                    (row != u32::from(NO_ROW)).then(|| side(row * width + hole, row.abs_diff(y)))
-                };
-                let stacked = Sides {
-                    first: vertical(above.at(hole, y)),
-                    second: vertical(below.at(hole, y)),
-                };
-                let (sides, others) = if stacked.run() < beside.run() {
-                    (stacked, beside)
-                } else {
-                    (beside, stacked)
-                };
-                let depth =
-                    |side: Side| source.depth.data()[source_of(splat.data()[side.cell as usize])];
-                let mut far = sides.farther(depth);
-                if sides.is_open() {
-                    far = farther(far, others.farther(depth), depth);
+    for_each_row(
+        pool,
+        far,
+        #[inline(always)]
+        |y, row| {
+            let splats = splat.row(y);
+            let mut left = None;
+            let mut x = 0;
+            while x < width {
+                if splats[x as usize] != NO_SOURCE {
+                    left = Some(x);
+                    x += 1;
+                    continue;
                 }
-                row[hole as usize] = far.map_or(NO_CELL, |side| side.cell);
+                let run = splats[x as usize..].iter().take_while(|splat| **splat == NO_SOURCE);
+                let end = x + u32::try_from(run.count()).expect("a row has at most 8192 cells");
+                let right = (end < width).then_some(end);
+                for hole in x..end {
+                    let side = |cell: u32, way: u32| Side { cell, way };
+                    let beside = Sides {
+                        first: left.map(|left| side(y * width + left, hole - left)),
+                        second: right.map(|right| side(y * width + right, right - hole)),
+                    };
+                    let vertical = |row: u16| {
+                        let row = u32::from(row);
+                        (row != u32::from(NO_ROW))
+                            .then(|| side(row * width + hole, row.abs_diff(y)))
+                    };
+                    let stacked = Sides {
+                        first: vertical(above.at(hole, y)),
+                        second: vertical(below.at(hole, y)),
+                    };
+                    let (sides, others) = if stacked.run() < beside.run() {
+                        (stacked, beside)
+                    } else {
+                        (beside, stacked)
+                    };
+                    let depth = |side: Side| {
+                        source.depth.data()[source_of(splat.data()[side.cell as usize])]
+                    };
+                    let mut far = sides.farther(depth);
+                    if sides.is_open() {
+                        far = farther(far, others.farther(depth), depth);
+                    }
+                    row[hole as usize] = far.map_or(NO_CELL, |side| side.cell);
+                }
+                x = end;
             }
-            x = end;
-        }
-    });
+        },
+    );
 }
 
 /// For each cell, the last row so far, in the order of `rows`, that is resolved in its column.

@@ -21,27 +21,33 @@ pub fn dilate_motion(
     let px_per_span = params
         .pixels_per_degree
         .map(|pixels_per_degree| pixels_per_degree * params.span.as_secs_f64() as f32);
-    for_each_row(pool, velocity, |y, row| {
-        for (velocity, &displacement) in row.iter_mut().zip(displacement.row(y)) {
-            *velocity = quantise(displacement, px_per_span);
-        }
-        if depth.data().is_empty() {
-            return;
-        }
-        for_each_block(depth, y, |first, near| {
-            let centres = &depth.row(y)[first as usize..][..near.len()];
-            for (x, (&near, &centre)) in (first..).zip(near.iter().zip(centres)) {
-                if near != centre {
-                    let (column, row_of) = nearest_in_3x3(depth, x, y, near);
-                    row[x as usize] = quantise(displacement.at(column, row_of), px_per_span);
-                }
+    for_each_row(
+        pool,
+        velocity,
+        #[inline(always)]
+        |y, row| {
+            for (velocity, &displacement) in row.iter_mut().zip(displacement.row(y)) {
+                *velocity = quantise(displacement, px_per_span);
             }
-        });
-    });
+            if depth.data().is_empty() {
+                return;
+            }
+            for_each_block(depth, y, |first, near| {
+                let centres = &depth.row(y)[first as usize..][..near.len()];
+                for (x, (&near, &centre)) in (first..).zip(near.iter().zip(centres)) {
+                    if near != centre {
+                        let (column, row_of) = nearest_in_3x3(depth, x, y, near);
+                        row[x as usize] = quantise(displacement.at(column, row_of), px_per_span);
+                    }
+                }
+            });
+        },
+    );
 }
 
 /// The depth keys of the surfaces that the cells of row `y` take their motion from, (2), into
 /// `dilated`.
+#[inline(always)]
 pub fn dilate_depth_row(depth: &Plane<u32>, y: u32, dilated: &mut [u32]) {
     for_each_block(depth, y, |first, near| {
         dilated[first as usize..][..near.len()].copy_from_slice(near);
@@ -52,6 +58,7 @@ pub fn dilate_depth_row(depth: &Plane<u32>, y: u32, dilated: &mut [u32]) {
 const BLOCK: usize = 64;
 
 /// Calls `block(first, keys)` with the depth keys of (2) for each run of cells of row `y`.
+#[inline(always)]
 fn for_each_block(depth: &Plane<u32>, y: u32, mut block: impl FnMut(u32, &[u32])) {
     let (width, height) = (depth.width() as usize, depth.height());
     let rows = [y.saturating_sub(1), y, (y + 1).min(height - 1)].map(|y| depth.row(y));

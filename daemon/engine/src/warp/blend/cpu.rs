@@ -23,9 +23,14 @@ pub fn blend(pool: &ThreadPool, older: &ColorPlane, newer: &ColorPlane, out: &mu
 }
 
 fn mean<T: Texel>(pool: &ThreadPool, older: &Plane<T>, newer: &Plane<T>, out: &mut Plane<T>) {
-    for_each_row(pool, out, |y, row| {
-        for ((texel, &a), &b) in row.iter_mut().zip(older.row(y)).zip(newer.row(y)) {
-            *texel = T::mix(a, b, 128);
-        }
-    });
+    for_each_row(
+        pool,
+        out,
+        #[inline(always)]
+        |y, row| {
+            for ((texel, &a), &b) in row.iter_mut().zip(older.row(y)).zip(newer.row(y)) {
+                *texel = T::mix(a, b, 128);
+            }
+        },
+    );
 }

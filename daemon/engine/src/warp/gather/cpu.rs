@@ -37,21 +37,28 @@ struct Field<'a> {
 
 fn warp<T: Texel>(pool: &ThreadPool, field: &Field<'_>, color: &Plane<T>, out: &mut Plane<T>) {
     let valid = field.valid;
-    for_each_row(pool, out, |y, row| {
-        row.copy_from_slice(color.row(y));
-        if !(valid.y..valid.y + valid.height).contains(&y) {
-            return;
-        }
-        let columns = &mut row[valid.x as usize..][..valid.width as usize];
-        for (block, texels) in (0..).zip(columns.chunks_mut(BLOCK)) {
-            let (mut xs, mut ys) = ([0; BLOCK], [0; BLOCK]);
-            let (xs, ys) = (&mut xs[..texels.len()], &mut ys[..texels.len()]);
-            for (index, (x, y_from)) in (block * BLOCK as u32..).zip(xs.iter_mut().zip(&mut *ys)) {
-                [*x, *y_from] = position(field, index, y - valid.y);
+    for_each_row(
+        pool,
+        out,
+        #[inline(always)]
+        |y, row| {
+            row.copy_from_slice(color.row(y));
+            if !(valid.y..valid.y + valid.height).contains(&y) {
+                return;
             }
-            T::sample_each(color, valid, xs, ys, texels);
-        }
-    });
+            let columns = &mut row[valid.x as usize..][..valid.width as usize];
+            for (block, texels) in (0..).zip(columns.chunks_mut(BLOCK)) {
+                let (mut xs, mut ys) = ([0; BLOCK], [0; BLOCK]);
+                let (xs, ys) = (&mut xs[..texels.len()], &mut ys[..texels.len()]);
+                for (index, (x, y_from)) in
+                    (block * BLOCK as u32..).zip(xs.iter_mut().zip(&mut *ys))
+                {
+                    [*x, *y_from] = position(field, index, y - valid.y);
+                }
+                T::sample_each(color, valid, xs, ys, texels);
+            }
+        },
+    );
 }
 
 /// Pixels whose positions are computed before they are read.

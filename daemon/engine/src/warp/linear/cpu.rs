@@ -3,6 +3,7 @@
 use rayon::ThreadPool;
 
 use super::LinearScratch;
+use super::between::{BLOCK, Between};
 use crate::bands::for_each_row;
 use crate::color::{ColorPlane, Texel};
 use crate::field::FieldMap;
@@ -11,7 +12,7 @@ use crate::phase::Phase;
 use crate::plane::{Plane, Rect};
 use crate::warp::displacement;
 use crate::warp::resolve::{CellClass, HOLE};
-use crate::warp::sample::sample;
+use crate::warp::sample::{sample, sample_run};
 
 /// Warps `key` to `phase` into `out`, which has the key's size and format. `map` is the map of
 /// the key's field grid; `scratch` has taken the key.
@@ -59,32 +60,45 @@ pub(super) struct Surface {
 
 fn gather<T: Texel>(pool: &ThreadPool, frame: &Frame<'_>, color: &Plane<T>, out: &mut Plane<T>) {
     let valid = frame.valid;
-    for_each_row(pool, out, |y, row| {
-        if !(valid.y..valid.y + valid.height).contains(&y) {
-            row.copy_from_slice(color.row(y));
-            return;
-        }
-        let (left, right) = (valid.x as usize, (valid.x + valid.width) as usize);
-        row[..left].copy_from_slice(&color.row(y)[..left]);
-        row[right..].copy_from_slice(&color.row(y)[right..]);
-        gather_row(frame, color, y - valid.y, &mut row[left..right]);
-    });
+    for_each_row(
+        pool,
+        out,
+        #[inline(always)]
+        |y, row| {
+            if !(valid.y..valid.y + valid.height).contains(&y) {
+                row.copy_from_slice(color.row(y));
+                return;
+            }
+            let (left, right) = (valid.x as usize, (valid.x + valid.width) as usize);
+            row[..left].copy_from_slice(&color.row(y)[..left]);
+            row[right..].copy_from_slice(&color.row(y)[right..]);
+            gather_row(frame, color, y - valid.y, &mut row[left..right]);
+        },
+    );
 }
 
 /// One row of the valid rectangle.
+#[inline(always)]
 fn gather_row<T: Texel>(frame: &Frame<'_>, color: &Plane<T>, index_y: u32, row: &mut [T]) {
     let class = frame.field.class.row(frame.map.y.cell_of(index_y));
     let p_y = ((frame.valid.y + index_y) << 8).cast_signed();
     let mut between = Between::new(frame, index_y);
     for (block, texels) in (0..).zip(row.chunks_mut(BLOCK)) {
         let first = block * BLOCK as u32;
-        let (mut xs, mut ys) = ([0; BLOCK], [p_y; BLOCK]);
-        let (xs, ys) = (&mut xs[..texels.len()], &mut ys[..texels.len()]);
-        between.positions(first, xs, ys);
-        T::sample_each(color, frame.valid, xs, ys, texels);
+        let p_x = ((frame.valid.x + first) << 8).cast_signed();
+        between.go_to(first, texels.len());
+        if let Some([dx, dy]) = between.shared() {
+            sample_run(color, frame.valid, [p_x - dx, p_y - dy], texels);
+        } else {
+            let (mut xs, mut ys) = ([0; BLOCK], [0; BLOCK]);
+            let (xs, ys) = (&mut xs[..texels.len()], &mut ys[..texels.len()]);
+            between.positions([p_x, p_y], xs, ys);
+            T::sample_each(color, frame.valid, xs, ys, texels);
+        }
         let end = first + texels.len() as u32 - 1;
         let (left, right) = (frame.map.x.cell_of(first), frame.map.x.cell_of(end));
-        if !class[left as usize..=right as usize].contains(&CellClass::Broken) {
+        let classes = &class[left as usize..=right as usize];
+        if !classes.iter().fold(false, |any, class| any | (*class == CellClass::Broken)) {
             continue;
         }
         for (index_x, texel) in (first..).zip(texels) {
@@ -94,65 +108,6 @@ fn gather_row<T: Texel>(frame: &Frame<'_>, color: &Plane<T>, index_y: u32, row: 
             }
         }
     }
-}
-
-/// Pixels whose positions are computed before they are read.
-const BLOCK: usize = 64;
-
-/// The velocities of the cells above and below a row of pixels.
-struct Between<'a> {
-    frame: &'a Frame<'a>,
-    above: &'a [[i16; 2]],
-    below: &'a [[i16; 2]],
-    way_y: i32,
-    /// Displacements of a block's cells, interpolated down to the row; one more than the block
-    /// can have cells, for the right neighbour of the last.
-    cells: [[i32; 2]; BLOCK + 2],
-}
-
-impl<'a> Between<'a> {
-    fn new(frame: &'a Frame<'a>, index_y: u32) -> Self {
-        let (y, way) = frame.map.y.before(index_y);
-        let carried = &frame.field.carried;
-        Self {
-            frame,
-            above: carried.row(y),
-            below: carried.row((y + 1).min(carried.height() - 1)),
-            way_y: way.cast_signed(),
-            cells: [[0; 2]; BLOCK + 2],
-        }
-    }
-
-    /// (1): where the pixels from `first` on are read, x into `xs`; `ys` holds their own y and
-    /// becomes where they are read. In broken cells the result is not used.
-    fn positions(&mut self, first: u32, xs: &mut [i32], ys: &mut [i32]) {
-        let map = &self.frame.map.x;
-        let last = first + xs.len() as u32 - 1;
-        let (start, end) = (map.before(first).0 as usize, map.before(last).0 as usize + 1);
-        let end = end.min(self.above.len() - 1);
-        let phase = self.frame.phase.q12();
-        let (above, below) = (&self.above[start..=end], &self.below[start..=end]);
-        for (cell, (above, below)) in self.cells.iter_mut().zip(above.iter().zip(below)) {
-            let shift = |v: i16| (i32::from(v) * phase + 256) >> 9;
-            *cell = lerp(above.map(shift), below.map(shift), self.way_y);
-        }
-        self.cells[end - start + 1] = self.cells[end - start];
-        let places = (first..).zip(xs.iter_mut().zip(ys));
-        for (index, (x, y)) in places {
-            let (cell, way) = map.before(index);
-            let cell = cell as usize - start;
-            let [dx, dy] = lerp(self.cells[cell], self.cells[cell + 1], way.cast_signed());
-            *x = ((self.frame.valid.x + index) << 8).cast_signed() - dx;
-            *y -= dy;
-        }
-    }
-}
-
-/// `a + ((b - a) way + 128) / 256`, rounded down. Displacements stay within 2^20, so nothing
-/// overflows; in a smooth cell they differ by half a pixel at most.
-#[inline]
-fn lerp(a: [i32; 2], b: [i32; 2], way: i32) -> [i32; 2] {
-    [a[0] + (((b[0] - a[0]) * way + 128) >> 8), a[1] + (((b[1] - a[1]) * way + 128) >> 8)]
 }
 
 impl Frame<'_> {

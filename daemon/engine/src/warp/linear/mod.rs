@@ -24,6 +24,7 @@
 //! Edges: reads are clamped to the valid rectangle; what comes in over the border is a hole.
 //! Phase 0 gives the key. Exactness: `Exact`.
 
+mod between;
 mod cpu;
 mod fill;
 mod scratch;

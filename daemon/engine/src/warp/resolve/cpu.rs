@@ -21,12 +21,17 @@ pub fn resolve(
 ) {
     carried.resize(splat.width(), splat.height());
     let velocities = source.velocity.data();
-    for_each_row(pool, carried, |y, row| {
-        for (velocity, &splat) in row.iter_mut().zip(splat.row(y)) {
-            let shown = if splat == NO_SOURCE { HOLE } else { velocities[source_of(splat)] };
-            *velocity = [shown.x, shown.y];
-        }
-    });
+    for_each_row(
+        pool,
+        carried,
+        #[inline(always)]
+        |y, row| {
+            for (velocity, &splat) in row.iter_mut().zip(splat.row(y)) {
+                let shown = if splat == NO_SOURCE { HOLE } else { velocities[source_of(splat)] };
+                *velocity = [shown.x, shown.y];
+            }
+        },
+    );
 }
 
 /// (2).
@@ -41,18 +46,24 @@ pub fn classify(
     // ((range p) >> 9 <= SMOOTH_RANGE) for every range up to this one.
     let limit = (((SMOOTH_RANGE + 1) << 9) - 1) / phase.q12().max(1);
     let limit = u16::try_from(limit).unwrap_or(u16::MAX);
-    for_each_row(pool, class, |y, row| {
-        let rows = [y.saturating_sub(1), y, (y + 1).min(height - 1)].map(|y| carried.row(y));
-        for (block, classes) in row.chunks_mut(BLOCK).enumerate() {
-            classify_block(&rows, block * BLOCK, limit, classes);
-        }
-    });
+    for_each_row(
+        pool,
+        class,
+        #[inline(always)]
+        |y, row| {
+            let rows = [y.saturating_sub(1), y, (y + 1).min(height - 1)].map(|y| carried.row(y));
+            for (block, classes) in row.chunks_mut(BLOCK).enumerate() {
+                classify_block(&rows, block * BLOCK, limit, classes);
+            }
+        },
+    );
 }
 
 /// Cells whose ranges are computed together.
 const BLOCK: usize = 64;
 
 /// Classes of the cells from `first` on.
+#[inline(always)]
 fn classify_block(rows: &[&[[i16; 2]]; 3], first: usize, limit: u16, classes: &mut [CellClass]) {
     // Smallest and largest of each column, from the one before the block to the one after it;
     // beyond the grid the column at its edge again, which changes neither.

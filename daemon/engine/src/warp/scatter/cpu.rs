@@ -35,21 +35,31 @@ impl SourceField {
         self.velocity.resize(width, height);
         self.depth.resize(width, height);
         let has_depth = !key.depth.data().is_empty();
-        crate::bands::for_each_row(pool, &mut self.velocity, |y, row| {
-            for (held, &velocity) in row.iter_mut().zip(key.velocity.row(y)) {
-                *held = if velocity.is_trackable() { velocity } else { Velocity::default() };
-            }
-        });
+        crate::bands::for_each_row(
+            pool,
+            &mut self.velocity,
+            #[inline(always)]
+            |y, row| {
+                for (held, &velocity) in row.iter_mut().zip(key.velocity.row(y)) {
+                    *held = if velocity.is_trackable() { velocity } else { Velocity::default() };
+                }
+            },
+        );
         let velocity = &self.velocity;
-        crate::bands::for_each_row(pool, &mut self.depth, |y, row| {
-            if has_depth {
-                dilate_depth_row(&key.depth, y, row);
-                return;
-            }
-            for (depth, &Velocity { x, y }) in row.iter_mut().zip(velocity.row(y)) {
-                *depth = (u32::from(x.unsigned_abs()) + u32::from(y.unsigned_abs())) >> 5;
-            }
-        });
+        crate::bands::for_each_row(
+            pool,
+            &mut self.depth,
+            #[inline(always)]
+            |y, row| {
+                if has_depth {
+                    dilate_depth_row(&key.depth, y, row);
+                    return;
+                }
+                for (depth, &Velocity { x, y }) in row.iter_mut().zip(velocity.row(y)) {
+                    *depth = (u32::from(x.unsigned_abs()) + u32::from(y.unsigned_abs())) >> 5;
+                }
+            },
+        );
         self.reach.clear();
         self.reach.extend((0..height).map(|y| {
             let rows = self.velocity.row(y).iter().map(|velocity| velocity.y);

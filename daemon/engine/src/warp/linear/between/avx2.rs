@@ -1,0 +1,63 @@
+//! Interpolates the displacement of eight pixels at a time.
+//!
+//! A grid has at most as many cells as pixels, so the cells before eight pixels in a row lie among
+//! eight: one load holds them, one more their right neighbours, and a permutation picks. The
+//! caller asks the processor whether it has AVX2.
+
+use std::arch::x86_64::{
+    __m256i, _mm256_add_epi32, _mm256_and_si256, _mm256_loadu_si256, _mm256_mullo_epi32,
+    _mm256_permutevar8x32_epi32, _mm256_set1_epi32, _mm256_setr_epi32, _mm256_srai_epi32,
+    _mm256_srli_epi32, _mm256_storeu_si256, _mm256_sub_epi32,
+};
+
+use super::{CELLS, LANES};
+
+/// Where the pixels at `places` (cell and way) are read, the first of them at `p`, Q8. The
+/// displacements `cells` start with that of cell `start`.
+///
+/// # Panics
+/// If a cell before a pixel is not among `cells`.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) fn positions(
+    cells: &[[i32; CELLS]; 2],
+    start: usize,
+    places: &[[u16; 2]; LANES],
+    p: [i32; 2],
+    xs: &mut [i32; LANES],
+    ys: &mut [i32; LANES],
+) {
+    let first = usize::from(places[0][0]);
+    // SAFETY: `places` holds 8 times two values of 16 bits, and the load needs no alignment.
+    let places = unsafe { _mm256_loadu_si256(places.as_ptr().cast()) };
+    let cell = _mm256_and_si256(places, _mm256_set1_epi32(0xffff));
+    let cell = _mm256_sub_epi32(cell, _mm256_set1_epi32(first as i32));
+    let way = _mm256_srli_epi32(places, 16);
+    let displacement = |cells: &[i32; CELLS]| {
+        let around: &[i32; LANES + 1] =
+            cells[first - start..].first_chunk().expect("cells reach a step beyond the block");
+        // SAFETY: both loads are of 8 of the 9 values of 32 bits, and need no alignment.
+        let (left, right) = unsafe {
+            (
+                _mm256_loadu_si256(around.as_ptr().cast()),
+                _mm256_loadu_si256(around.as_ptr().add(1).cast()),
+            )
+        };
+        let left = _mm256_permutevar8x32_epi32(left, cell);
+        let right = _mm256_permutevar8x32_epi32(right, cell);
+        let part = _mm256_mullo_epi32(_mm256_sub_epi32(right, left), way);
+        let part = _mm256_srai_epi32(_mm256_add_epi32(part, _mm256_set1_epi32(128)), 8);
+        _mm256_add_epi32(left, part)
+    };
+    let steps = _mm256_setr_epi32(0, 0x100, 0x200, 0x300, 0x400, 0x500, 0x600, 0x700);
+    let x = _mm256_add_epi32(_mm256_set1_epi32(p[0]), steps);
+    store(xs, _mm256_sub_epi32(x, displacement(&cells[0])));
+    store(ys, _mm256_sub_epi32(_mm256_set1_epi32(p[1]), displacement(&cells[1])));
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn store(to: &mut [i32; LANES], from: __m256i) {
+    // SAFETY: `to` holds 8 values of 32 bits, and the store needs no alignment.
+    unsafe { _mm256_storeu_si256(to.as_mut_ptr().cast(), from) };
+}
