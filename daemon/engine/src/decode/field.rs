@@ -122,16 +122,24 @@ impl<'a> FieldInput<'a> {
         let (to_key, contradiction) = DepthToKey::new(convention.meaning, self.projection);
         self.tables(&plane, columns);
         let [columns, rows] = &*columns;
+        let is_own = is_own_sample(columns, &plane);
         keys.resize(self.cells[0], self.cells[1]);
-        // One loop per format: the compiler then sees a constant format inside it.
+        // One loop per format and its bytes: the compiler then sees a constant format inside it.
         macro_rules! read {
-            ($format:expr) => {
+            ($format:expr, $bytes:literal) => {
                 for_each_row(
                     self.pool,
                     keys,
                     #[inline(always)]
                     |y, out| {
                         let row = plane.valid_row(u32::from(rows[y as usize]));
+                        if is_own {
+                            let (texels, _) = row.as_chunks::<$bytes>();
+                            for (key, texel) in out.iter_mut().zip(texels) {
+                                *key = to_key.key(stored_depth($format, texel, 0));
+                            }
+                            return;
+                        }
                         for (key, &x) in out.iter_mut().zip(columns) {
                             *key = to_key.key(stored_depth($format, row, usize::from(x)));
                         }
@@ -140,10 +148,10 @@ impl<'a> FieldInput<'a> {
             };
         }
         match convention.format {
-            DepthFormat::F32 => read!(DepthFormat::F32),
-            DepthFormat::F16 => read!(DepthFormat::F16),
-            DepthFormat::U16 => read!(DepthFormat::U16),
-            DepthFormat::U24 => read!(DepthFormat::U24),
+            DepthFormat::F32 => read!(DepthFormat::F32, 4),
+            DepthFormat::F16 => read!(DepthFormat::F16, 2),
+            DepthFormat::U16 => read!(DepthFormat::U16, 2),
+            DepthFormat::U24 => read!(DepthFormat::U24, 4),
         }
         contradiction
     }
@@ -160,15 +168,24 @@ impl<'a> FieldInput<'a> {
         let factor = pixels_per_unit(&convention, size(self.image), size(self.color.valid))?;
         self.tables(&plane, columns);
         let [table, rows] = &*columns;
+        let is_own = is_own_sample(table, &plane);
         out.resize(self.cells[0], self.cells[1]);
         macro_rules! read {
-            ($format:expr) => {
+            ($format:expr, $bytes:literal) => {
                 for_each_row(
                     self.pool,
                     out,
                     #[inline(always)]
                     |y, out| {
                         let row = plane.valid_row(u32::from(rows[y as usize]));
+                        if is_own {
+                            let (texels, _) = row.as_chunks::<$bytes>();
+                            for (displacement, texel) in out.iter_mut().zip(texels) {
+                                let [dx, dy] = stored_motion($format, texel, 0);
+                                *displacement = [dx * factor[0], dy * factor[1]];
+                            }
+                            return;
+                        }
                         for (displacement, &x) in out.iter_mut().zip(table) {
                             let [dx, dy] = stored_motion($format, row, usize::from(x));
                             *displacement = [dx * factor[0], dy * factor[1]];
@@ -178,8 +195,8 @@ impl<'a> FieldInput<'a> {
             };
         }
         match convention.format {
-            MotionFormat::Rg16f => read!(MotionFormat::Rg16f),
-            MotionFormat::Rg32f => read!(MotionFormat::Rg32f),
+            MotionFormat::Rg16f => read!(MotionFormat::Rg16f, 4),
+            MotionFormat::Rg32f => read!(MotionFormat::Rg32f, 8),
         }
         match convention.camera_motion {
             format::CameraMotion::Included => Ok(()),
@@ -217,4 +234,10 @@ impl<'a> FieldInput<'a> {
         );
         Ok(())
     }
+}
+
+/// Whether each column of the grid takes the sample of its own number: rows are then read straight.
+fn is_own_sample(columns: &[u16], plane: &CheckedPlane<'_>) -> bool {
+    columns.len() <= plane.valid.width as usize
+        && columns.iter().enumerate().all(|(column, sample)| usize::from(*sample) == column)
 }

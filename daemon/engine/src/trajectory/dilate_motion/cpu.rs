@@ -26,14 +26,24 @@ pub fn dilate_motion(
         velocity,
         #[inline(always)]
         |y, row| {
-            for (velocity, &displacement) in row.iter_mut().zip(displacement.row(y)) {
-                *velocity = quantise(displacement, px_per_span);
+            let cells = row.iter_mut().zip(displacement.row(y));
+            // A loop of its own without damping, which has no call in it.
+            if px_per_span.is_none() {
+                cells
+                    .for_each(|(velocity, &displacement)| *velocity = quantise(displacement, None));
+            } else {
+                cells.for_each(|(velocity, &displacement)| {
+                    *velocity = quantise(displacement, px_per_span);
+                });
             }
             if depth.data().is_empty() {
                 return;
             }
             for_each_block(depth, y, |first, near| {
                 let centres = &depth.row(y)[first as usize..][..near.len()];
+                if near == centres {
+                    return;
+                }
                 for (x, (&near, &centre)) in (first..).zip(near.iter().zip(centres)) {
                     if near != centre {
                         let (column, row_of) = nearest_in_3x3(depth, x, y, near);
@@ -94,11 +104,10 @@ fn nearest_in_3x3(depth: &Plane<u32>, x: u32, y: u32, max: u32) -> (u32, u32) {
 
 /// (3) and (4). `px_per_span` is pixels per span of a speed of one degree per second.
 #[expect(clippy::cast_possible_truncation, reason = "at most 1023 * 32, which fits an i16")]
+#[inline(always)]
 fn quantise([dx, dy]: [f32; 2], px_per_span: Option<f32>) -> Velocity {
-    // Written so that NaN fails it.
-    if !(dx.abs() <= MAX_DISPLACEMENT_PX && dy.abs() <= MAX_DISPLACEMENT_PX) {
-        return Velocity::UNTRACKABLE;
-    }
+    // Written so that NaN fails it, and without a branch.
+    let is_known = (dx.abs() <= MAX_DISPLACEMENT_PX) & (dy.abs() <= MAX_DISPLACEMENT_PX);
     let share = px_per_span
         .map_or(1.0, |px_per_span| tracked_share(libm::sqrtf(dx * dx + dy * dy) / px_per_span));
     let steps = |d: f32| {
@@ -106,5 +115,6 @@ fn quantise([dx, dy]: [f32; 2], px_per_span: Option<f32>) -> Velocity {
         let magnitude = (scaled.abs() + 0.5) as i32;
         (if scaled < 0.0 { -magnitude } else { magnitude }) as i16
     };
-    Velocity { x: steps(dx), y: steps(dy) }
+    let velocity = Velocity { x: steps(dx), y: steps(dy) };
+    if is_known { velocity } else { Velocity::UNTRACKABLE }
 }

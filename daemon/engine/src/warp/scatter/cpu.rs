@@ -1,5 +1,7 @@
 //! The reference of [`super`].
 
+use std::ops::Range;
+
 use rayon::ThreadPool;
 
 use super::{NO_SOURCE, SOURCE_BITS};
@@ -89,17 +91,29 @@ pub fn scatter(
     splat.resize(width, height);
     let scale = [phase_in_cells(phase, &map.x), phase_in_cells(phase, &map.y)];
     let band_rows = BAND_ROWS.min((height as usize).div_ceil(pool.current_num_threads()));
-    for_each_band(pool, top, splat, band_rows, |first_row, top, splat| {
-        top.fill(0);
-        splat.fill(NO_SOURCE);
-        let mut band = Band { source, scale, first_row, top, splat };
-        band.visit(|top, _, depth, _| *top = (*top).max(depth));
-        band.visit(|top, splat, depth, candidate| {
-            if depth >= *top - (*top >> 8) {
-                *splat = (*splat).min(candidate);
-            }
-        });
-    });
+    for_each_band(
+        pool,
+        top,
+        splat,
+        band_rows,
+        #[inline(always)]
+        |first_row, top, splat| {
+            top.fill(0);
+            splat.fill(NO_SOURCE);
+            let mut band = Band { source, scale, first_row, top, splat };
+            band.visit(
+                #[inline(always)]
+                |top, _, depth, _| *top = (*top).max(depth),
+            );
+            band.visit(
+                #[inline(always)]
+                |top, splat, depth, candidate| {
+                    let shows = depth >= *top - (*top >> 8);
+                    *splat = (*splat).min(if shows { candidate } else { NO_SOURCE });
+                },
+            );
+        },
+    );
 }
 
 /// A run of target rows and what lands on it.
@@ -111,64 +125,121 @@ struct Band<'a> {
     splat: &'a mut [u32],
 }
 
+/// Cells of one velocity in a row that are splatted together: with fewer the loops do not pay.
+const MIN_RUN: usize = 8;
+
 impl Band<'_> {
     /// Calls `cell(top, splat, depth key, candidate of (3))` for each splat on the band.
+    #[inline(always)]
     fn visit(&mut self, cell: impl Fn(&mut u32, &mut u32, u32, u32)) {
-        let width = self.source.velocity.width() as usize;
+        let source = self.source;
+        let width = source.velocity.width() as usize;
         let rows = (self.top.len() / width).cast_signed();
         let first_row = self.first_row as isize;
         let [scale_x, scale_y] = self.scale;
-        for (y, &[slowest, fastest]) in (0_u32..).zip(&self.source.reach) {
+        for (y, &[slowest, fastest]) in (0_u32..).zip(&source.reach) {
             let land = |v: i16| ((y << 8).cast_signed() + shift(v, scale_y)) >> 8;
             let (from, to) =
                 (land(slowest) as isize - first_row, land(fastest) as isize + 1 - first_row);
             if to < 0 || from >= rows {
                 continue;
             }
-            let velocities = self.source.velocity.row(y);
-            let depths = self.source.depth.row(y);
-            for (x, (velocity, &depth)) in (0_u32..).zip(velocities.iter().zip(depths)) {
-                let target_x = (x << 8).cast_signed() + shift(velocity.x, scale_x);
+            let velocities = source.velocity.row(y);
+            let mut x = 0;
+            while x < width {
+                let velocity = velocities[x];
+                let run = velocities[x..].iter().take_while(|other| **other == velocity).count();
+                let cells = x..x + run;
+                x = cells.end;
                 let target_y = (y << 8).cast_signed() + shift(velocity.y, scale_y);
-                let (left, fx) = (target_x >> 8, (target_x & 0xff).cast_unsigned());
-                let (above, fy) = (target_y >> 8, (target_y & 0xff).cast_unsigned());
-                let index = y * width as u32 + x;
-                // Most cells: all four inside, or on a column and row and so a single one.
-                let inside_y = above as isize - first_row;
-                if (0..rows - 1).contains(&inside_y) && (0..width as i32 - 1).contains(&left) {
-                    let place = inside_y.cast_unsigned() * width + left as usize;
-                    let candidate = |way: u32| ((way >> 2) << SOURCE_BITS) | index;
-                    cell(&mut self.top[place], &mut self.splat[place], depth, candidate(fx + fy));
-                    if fx | fy == 0 {
-                        continue;
-                    }
-                    let mut beside = |place: usize, way: u32| {
-                        cell(&mut self.top[place], &mut self.splat[place], depth, candidate(way));
-                    };
-                    if fx > 0 {
-                        beside(place + 1, 256 - fx + fy);
-                    }
-                    if fy > 0 {
-                        beside(place + width, fx + 256 - fy);
-                        if fx > 0 {
-                            beside(place + width + 1, 512 - fx - fy);
-                        }
-                    }
+                let inside_y = (target_y >> 8) as isize - first_row;
+                if inside_y < -1 || inside_y >= rows {
                     continue;
                 }
-                for (row, way_y) in [(above, fy), (above + 1, 256 - fy)] {
-                    let row = row as isize - first_row;
-                    if way_y == 256 || row < 0 || row >= rows {
-                        continue;
-                    }
-                    for (column, way_x) in [(left, fx), (left + 1, 256 - fx)] {
-                        if way_x == 256 || column < 0 || column >= width as i32 {
-                            continue;
-                        }
-                        let place = row.cast_unsigned() * width + column as usize;
-                        let candidate = (((way_x + way_y) >> 2) << SOURCE_BITS) | index;
-                        cell(&mut self.top[place], &mut self.splat[place], depth, candidate);
-                    }
+                let moved = [shift(velocity.x, scale_x), target_y];
+                if run >= MIN_RUN {
+                    self.splat_run(y, cells, moved, &cell);
+                    continue;
+                }
+                for x in cells {
+                    self.splat_cell(y, x, moved, &cell);
+                }
+            }
+        }
+    }
+
+    /// Splats cell (`x`, `y`), which lands `moved_x` right of its place in row `target_y`, Q8.
+    #[inline(always)]
+    fn splat_cell(
+        &mut self,
+        y: u32,
+        x: usize,
+        [moved_x, target_y]: [i32; 2],
+        cell: impl Fn(&mut u32, &mut u32, u32, u32),
+    ) {
+        let width = self.source.velocity.width() as usize;
+        let rows = (self.top.len() / width).cast_signed();
+        let target_x = ((x << 8) as i32) + moved_x;
+        let (left, fx) = (target_x >> 8, (target_x & 0xff).cast_unsigned());
+        let (above, fy) = (target_y >> 8, (target_y & 0xff).cast_unsigned());
+        let inside_y = above as isize - self.first_row as isize;
+        // Most cells: all four inside.
+        if !(0..rows - 1).contains(&inside_y) || !(0..width as i32 - 1).contains(&left) {
+            self.splat_run(y, x..x + 1, [moved_x, target_y], cell);
+            return;
+        }
+        let place = inside_y.cast_unsigned() * width + left as usize;
+        let (depth, index) = (self.source.depth.row(y)[x], y * width as u32 + x as u32);
+        let mut splat = |place: usize, way: u32| {
+            let candidate = ((way >> 2) << SOURCE_BITS) | index;
+            cell(&mut self.top[place], &mut self.splat[place], depth, candidate);
+        };
+        splat(place, fx + fy);
+        if fx > 0 {
+            splat(place + 1, 256 - fx + fy);
+        }
+        if fy > 0 {
+            splat(place + width, fx + 256 - fy);
+            if fx > 0 {
+                splat(place + width + 1, 512 - fx - fy);
+            }
+        }
+    }
+
+    /// As [`Self::splat_cell`] for the cells `cells` of row `y`, which move alike.
+    #[inline(always)]
+    fn splat_run(
+        &mut self,
+        y: u32,
+        cells: Range<usize>,
+        [moved_x, target_y]: [i32; 2],
+        cell: impl Fn(&mut u32, &mut u32, u32, u32),
+    ) {
+        let width = self.source.velocity.width() as usize;
+        let rows = (self.top.len() / width).cast_signed();
+        let (right_by, fx) = ((moved_x >> 8) as isize, (moved_x & 0xff).cast_unsigned());
+        let (above, fy) = (target_y >> 8, (target_y & 0xff).cast_unsigned());
+        let depths = self.source.depth.row(y);
+        for (row, way_y) in [(above, fy), (above + 1, 256 - fy)] {
+            let row = row as isize - self.first_row as isize;
+            if way_y == 256 || row < 0 || row >= rows {
+                continue;
+            }
+            for (right_by, way_x) in [(right_by, fx), (right_by + 1, 256 - fx)] {
+                let end = width.saturating_add_signed(-right_by).min(cells.end);
+                let start = 0_usize.saturating_add_signed(-right_by).max(cells.start);
+                if way_x == 256 || start >= end {
+                    continue;
+                }
+                let place = row.cast_unsigned() * width + start.wrapping_add_signed(right_by);
+                let count = end - start;
+                let (tops, splats) =
+                    (&mut self.top[place..][..count], &mut self.splat[place..][..count]);
+                let first =
+                    ((way_x + way_y) >> 2 << SOURCE_BITS) | (y * width as u32 + start as u32);
+                let targets = tops.iter_mut().zip(splats).zip(&depths[start..end]);
+                for (candidate, ((top, splat), &depth)) in (first..).zip(targets) {
+                    cell(top, splat, depth, candidate);
                 }
             }
         }

@@ -42,13 +42,15 @@ proptest! {
     fn every_cell_shows_what_the_definition_says_and_holes_are_where_nothing_lands(
         (width, height) in (1_u32..24, 1_u32..20),
         reach in 0_u32..8,
+        patch in 1_u32..20,
         levels in 1_u32..5,
         seed: u32,
         phase in 0.0..4.0,
         threads in 1_usize..5,
     ) {
         let steps = reach * 64 + 1;
-        let v = |x, y, axis| (hash(x, y, seed + axis) % steps) as i16 - (reach * 32) as i16;
+        // Patches of one velocity, some of them wide enough to be splatted as runs.
+        let v = |x, y, axis| (hash(x / patch, y, seed.wrapping_add(axis)) % steps) as i16 - (reach * 32) as i16;
         // Few depths, some within the tolerance of each other.
         let depth = plane(width, height, |x, y| 100_000 + 300 * (hash(x, y, seed) % levels));
         let velocity = plane(width, height, |x, y| Velocity { x: v(x, y, 1), y: v(x, y, 2) });
