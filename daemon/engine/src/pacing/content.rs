@@ -15,11 +15,10 @@ use crate::time::{MonoSpan, MonoTime};
 /// Keys that the delay looks back on: 3 s at 40 Hz. Shorter and the minimum wanders with jitter,
 /// longer and extrapolation stays needlessly long after an early key.
 const WINDOW: usize = 128;
-/// Time constant with which the delay follows a smaller offer.
-const TIGHTEN_TIME: MonoSpan = MonoSpan::from_ms(500);
-/// Time constant with which it is released when small offers have left the window. Slow: the next
-/// one makes content time jump by what was released.
-const RELEASE_TIME: MonoSpan = MonoSpan::from_ms(4_000);
+/// Time constant with which the delay follows its target. Found with `foreframe pacing`: eight times
+/// as long, and one early key keeps all others from being shown as they are for seconds (1 real
+/// frame of 2400 with arrivals jittering by 2 ms, against 2026), with no less judder.
+const FOLLOW_TIME: MonoSpan = MonoSpan::from_ms(500);
 /// It changes by at most 1/32 of the time that passes: velocity on the screen stays within 3 %.
 const FASTEST_SLEW_DIVISOR: i64 = 32;
 /// Content time that leaps ahead by more was set, not jittered.
@@ -100,8 +99,7 @@ impl ContentClock {
         let error = target - line.delay;
         let passed = (present_at - line.present_at).max(MonoSpan::ZERO);
         let fastest = passed.scale(1, FASTEST_SLEW_DIVISOR);
-        let time = if error < MonoSpan::ZERO { TIGHTEN_TIME } else { RELEASE_TIME };
-        let slew = error.scale(passed.min(time).as_ns(), time.as_ns());
+        let slew = error.scale(passed.min(FOLLOW_TIME).as_ns(), FOLLOW_TIME.as_ns());
         Some(line.delay + slew.clamp(-fastest, fastest))
     }
 
