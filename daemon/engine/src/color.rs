@@ -351,6 +351,32 @@ mod tests {
         }
 
         #[test]
+        fn sampling_close_together_equals_sampling_one_by_one(
+            (width, height) in (1_u32..40, 1_u32..20),
+            (left, top) in (0_u32..4, 0_u32..4),
+            (x, y) in (-900..9000_i32, -900..6000_i32),
+            steps in proptest::collection::vec((150..340_i32, -20..20_i32), 0..30),
+            seed: u32,
+        ) {
+            let ColorPlane::Rgba8(plane) =
+                crate::testing::noise(ColorFormat::Rgba8, width + left, height + top, seed)
+            else {
+                unreachable!("the format asked for")
+            };
+            let valid = Rect { x: left, y: top, width, height };
+            let places = steps.into_iter().scan([x, y], |place, (dx, dy)| {
+                *place = [place[0] + dx, place[1] + dy];
+                Some((place[0], place[1]))
+            });
+            let (xs, ys): (Vec<i32>, Vec<i32>) = places.unzip();
+            let mut out = vec![Rgba8::default(); xs.len()];
+            Rgba8::sample_each(&plane, valid, &xs, &ys, &mut out);
+            for ((x, y), texel) in xs.into_iter().zip(ys).zip(out) {
+                prop_assert_eq!(texel, sample(&plane, valid, x, y), "at {}, {}", x, y);
+            }
+        }
+
+        #[test]
         fn sampling_a_run_equals_sampling_one_by_one(
             (width, height) in (1_u32..40, 1_u32..20),
             (left, top) in (0_u32..4, 0_u32..4),

@@ -100,6 +100,12 @@ impl FieldAxis {
         u32::from(self.cell[index as usize])
     }
 
+    /// [`Self::cell_of`] of `count` pixels from `index` on.
+    #[must_use]
+    pub fn cell_of_each(&self, index: u32, count: usize) -> &[u16] {
+        &self.cell[index as usize..][..count]
+    }
+
     /// The last cell whose centre is not right of or below pixel `first_pixel + index`, and the
     /// way to the next one in 1/256 (3). The way is 0 wherever there is no next one.
     #[must_use]

@@ -4,13 +4,14 @@
 //! [`crate::warp::sample`]. The caller asks the processor whether it has AVX2.
 
 use std::arch::x86_64::{
-    __m256i, _mm256_add_epi16, _mm256_add_epi32, _mm256_and_si256, _mm256_i32gather_epi32,
-    _mm256_loadu_si256, _mm256_madd_epi16, _mm256_max_epi32, _mm256_min_epi32, _mm256_mullo_epi16,
-    _mm256_mullo_epi32, _mm256_or_si256, _mm256_packs_epi32, _mm256_packus_epi16,
-    _mm256_set1_epi16, _mm256_set1_epi32, _mm256_setzero_si256, _mm256_shuffle_epi32,
-    _mm256_slli_epi32, _mm256_srai_epi32, _mm256_srli_epi32, _mm256_storeu_si256, _mm256_sub_epi32,
-    _mm256_unpackhi_epi8, _mm256_unpackhi_epi16, _mm256_unpackhi_epi32, _mm256_unpacklo_epi8,
-    _mm256_unpacklo_epi16, _mm256_unpacklo_epi32, _mm256_xor_si256,
+    __m256i, _mm256_add_epi16, _mm256_add_epi32, _mm256_and_si256, _mm256_andnot_si256,
+    _mm256_cvtsi256_si32, _mm256_i32gather_epi32, _mm256_loadu_si256, _mm256_madd_epi16,
+    _mm256_max_epi32, _mm256_min_epi32, _mm256_mullo_epi16, _mm256_mullo_epi32, _mm256_or_si256,
+    _mm256_packs_epi32, _mm256_packus_epi16, _mm256_permutevar8x32_epi32, _mm256_set1_epi16,
+    _mm256_set1_epi32, _mm256_setzero_si256, _mm256_shuffle_epi32, _mm256_slli_epi32,
+    _mm256_srai_epi32, _mm256_srli_epi32, _mm256_storeu_si256, _mm256_sub_epi32,
+    _mm256_testz_si256, _mm256_unpackhi_epi8, _mm256_unpackhi_epi16, _mm256_unpackhi_epi32,
+    _mm256_unpacklo_epi8, _mm256_unpacklo_epi16, _mm256_unpacklo_epi32, _mm256_xor_si256,
 };
 
 use super::Rgba8;
@@ -60,22 +61,61 @@ pub(super) fn sample_eight(
     let (x, y) =
         unsafe { (_mm256_loadu_si256(xs.as_ptr().cast()), _mm256_loadu_si256(ys.as_ptr().cast())) };
     let (x, y) = (between(x, valid.x, valid.width), between(y, valid.y, valid.height));
-    let width = _mm256_set1_epi32(plane.width().cast_signed());
-    let (top, bottom) = (_mm256_mullo_epi32(y.low, width), _mm256_mullo_epi32(y.high, width));
-    let read = |row: __m256i, column: __m256i| {
-        // SAFETY: `between` clamps to `valid`, which lies inside the plane (asserted above), so
-        // row * width + column is the index of a pixel of 4 bytes.
-        unsafe {
-            _mm256_i32gather_epi32::<4>(plane.data().as_ptr().cast(), _mm256_add_epi32(row, column))
+    let rows = match near_rows(plane, &x, &y) {
+        Some(rows) => rows,
+        None => {
+            let width = _mm256_set1_epi32(plane.width().cast_signed());
+            let [top, bottom] = [y.low, y.high].map(|row| _mm256_mullo_epi32(row, width));
+            let read = |row: __m256i, column: __m256i| {
+                let index = _mm256_add_epi32(row, column);
+                // SAFETY: `between` clamps to `valid`, which lies inside the plane (asserted
+                // above), so row * width + column is the index of a pixel of 4 bytes.
+                unsafe { _mm256_i32gather_epi32::<4>(plane.data().as_ptr().cast(), index) }
+            };
+            [
+                across(read(top, x.low), read(top, x.high), x.way),
+                across(read(bottom, x.low), read(bottom, x.high), x.way),
+            ]
         }
     };
-    let rows = [
-        across(read(top, x.low), read(top, x.high), x.way),
-        across(read(bottom, x.low), read(bottom, x.high), x.way),
-    ];
     let pixels = down(rows, y.way);
     // SAFETY: `out` holds 8 pixels of 32 bits, and the store needs no alignment.
     unsafe { _mm256_storeu_si256(out.as_mut_ptr().cast(), pixels) };
+}
+
+/// Both rows interpolated to the right, where all positions lie in one row and at most 7 pixels
+/// right of the first: then two loads hold what a gather would fetch one by one.
+///
+/// The pixel after the last valid one may be read, where its weight is 0.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn near_rows(plane: &Plane<Rgba8>, x: &Between, y: &Between) -> Option<[[__m256i; 2]; 2]> {
+    let first = _mm256_cvtsi256_si32(x.low);
+    let column = _mm256_sub_epi32(x.low, _mm256_set1_epi32(first));
+    let row = _mm256_cvtsi256_si32(y.low);
+    let far = _mm256_andnot_si256(_mm256_set1_epi32(LANES as i32 - 1), column);
+    let other_row = _mm256_xor_si256(y.low, _mm256_set1_epi32(row));
+    let apart = _mm256_or_si256(far, other_row);
+    if _mm256_testz_si256(apart, apart) == 0 {
+        return None;
+    }
+    let nine = |row: i32| {
+        let start = row as usize * plane.width() as usize + first as usize;
+        plane.data().get(start..)?.first_chunk::<{ LANES + 1 }>()
+    };
+    let (top, bottom) = (nine(row)?, nine(_mm256_cvtsi256_si32(y.high))?);
+    let read = |nine: &[Rgba8; LANES + 1]| {
+        // SAFETY: both loads are of 8 of the 9 pixels of 32 bits, and need no alignment.
+        let (left, right) = unsafe {
+            (
+                _mm256_loadu_si256(nine.as_ptr().cast()),
+                _mm256_loadu_si256(nine.as_ptr().add(1).cast()),
+            )
+        };
+        let pick = |pixels: __m256i| _mm256_permutevar8x32_epi32(pixels, column);
+        across(pick(left), pick(right), x.way)
+    };
+    Some([read(top), read(bottom)])
 }
 
 /// The mean of pixels `i` and `i + 1` of `top` and `bottom` at `fx`, `fy` into each `out[i]`, as

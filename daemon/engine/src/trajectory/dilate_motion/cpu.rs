@@ -29,12 +29,13 @@ pub fn dilate_motion(
             let cells = row.iter_mut().zip(displacement.row(y));
             // A loop of its own without damping, which has no call in it.
             if px_per_span.is_none() {
-                cells
-                    .for_each(|(velocity, &displacement)| *velocity = quantise(displacement, None));
+                for (velocity, &displacement) in cells {
+                    *velocity = quantise(displacement, None);
+                }
             } else {
-                cells.for_each(|(velocity, &displacement)| {
+                for (velocity, &displacement) in cells {
                     *velocity = quantise(displacement, px_per_span);
-                });
+                }
             }
             if depth.data().is_empty() {
                 return;

@@ -9,6 +9,7 @@ use crate::key::{KeyFrame, Velocity};
 use crate::phase::Phase;
 use crate::plane::{Plane, Rect};
 use crate::warp::displacement;
+use crate::warp::sample::sample_run;
 
 /// Warps `key` to `phase` into `out`, which has the key's size and format. `map` is the map of
 /// the key's field grid; the key has a velocity field.
@@ -42,20 +43,15 @@ fn warp<T: Texel>(pool: &ThreadPool, field: &Field<'_>, color: &Plane<T>, out: &
         out,
         #[inline(always)]
         |y, row| {
-            row.copy_from_slice(color.row(y));
             if !(valid.y..valid.y + valid.height).contains(&y) {
+                row.copy_from_slice(color.row(y));
                 return;
             }
-            let columns = &mut row[valid.x as usize..][..valid.width as usize];
-            for (block, texels) in (0..).zip(columns.chunks_mut(BLOCK)) {
-                let (mut xs, mut ys) = ([0; BLOCK], [0; BLOCK]);
-                let (xs, ys) = (&mut xs[..texels.len()], &mut ys[..texels.len()]);
-                for (index, (x, y_from)) in
-                    (block * BLOCK as u32..).zip(xs.iter_mut().zip(&mut *ys))
-                {
-                    [*x, *y_from] = position(field, index, y - valid.y);
-                }
-                T::sample_each(color, valid, xs, ys, texels);
+            let (left, right) = (valid.x as usize, (valid.x + valid.width) as usize);
+            row[..left].copy_from_slice(&color.row(y)[..left]);
+            row[right..].copy_from_slice(&color.row(y)[right..]);
+            for (block, texels) in (0..).zip(row[left..right].chunks_mut(BLOCK)) {
+                gather_block(field, color, [block * BLOCK as u32, y - valid.y], texels);
             }
         },
     );
@@ -64,10 +60,31 @@ fn warp<T: Texel>(pool: &ThreadPool, field: &Field<'_>, color: &Plane<T>, out: &
 /// Pixels whose positions are computed before they are read.
 const BLOCK: usize = 64;
 
-/// Where (1) reads pixel `index_x`, `index_y` of the valid rectangle.
-fn position(field: &Field<'_>, index_x: u32, index_y: u32) -> [i32; 2] {
-    let cell = (field.map.x.cell_of(index_x), field.map.y.cell_of(index_y));
-    let [dx, dy] = displacement(field.velocity.at(cell.0, cell.1), field.phase);
-    let x = ((field.valid.x + index_x) << 8).cast_signed() - dx;
-    [x, ((field.valid.y + index_y) << 8).cast_signed() - dy]
+/// The pixels from (`index_x`, `index_y`) of the valid rectangle on.
+#[inline(always)]
+fn gather_block<T: Texel>(
+    field: &Field<'_>,
+    color: &Plane<T>,
+    [index_x, index_y]: [u32; 2],
+    texels: &mut [T],
+) {
+    let valid = field.valid;
+    let [p_x, p_y] = [valid.x + index_x, valid.y + index_y].map(|p| (p << 8).cast_signed());
+    let cell_of = field.map.x.cell_of_each(index_x, texels.len());
+    let velocities = field.velocity.row(field.map.y.cell_of(index_y));
+    let (first, last) = (usize::from(cell_of[0]), usize::from(cell_of[texels.len() - 1]));
+    let velocities = &velocities[first..=last];
+    if velocities.iter().all(|velocity| *velocity == velocities[0]) {
+        let [dx, dy] = displacement(velocities[0], field.phase);
+        sample_run(color, valid, [p_x - dx, p_y - dy], texels);
+        return;
+    }
+    let (mut xs, mut ys) = ([0; BLOCK], [0; BLOCK]);
+    let (xs, ys) = (&mut xs[..texels.len()], &mut ys[..texels.len()]);
+    let places = xs.iter_mut().zip(&mut *ys).zip(cell_of);
+    for (p_x, ((x, y), cell)) in (p_x..).step_by(256).zip(places) {
+        let [dx, dy] = displacement(velocities[usize::from(*cell) - first], field.phase);
+        (*x, *y) = (p_x - dx, p_y - dy);
+    }
+    T::sample_each(color, valid, xs, ys, texels);
 }
