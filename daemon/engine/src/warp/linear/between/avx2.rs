@@ -61,3 +61,40 @@ fn store(to: &mut [i32; LANES], from: __m256i) {
     // SAFETY: `to` holds 8 values of 32 bits, and the store needs no alignment.
     unsafe { _mm256_storeu_si256(to.as_mut_ptr().cast(), from) };
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::lerp;
+    use super::*;
+    use crate::testing::hash;
+
+    #[test]
+    fn eight_positions_equal_those_one_by_one() {
+        if !is_x86_feature_detected!("avx2") {
+            return;
+        }
+        for case in 0..2000 {
+            let displacement =
+                |i: usize, axis| (hash(case, i as u32, axis) >> 11) as i32 - 0x10_0000;
+            let cells = [0, 1].map(|axis| std::array::from_fn(|i| displacement(i, axis)));
+            let (start, first) = (5, (hash(case, 0, 2) % 64) as usize);
+            let places: [[u16; 2]; LANES] = std::array::from_fn(|i| {
+                let cell = start + first + i * (case as usize % 8) / 7;
+                [cell as u16, (hash(case, i as u32, 3) & 0xff) as u16]
+            });
+            let (mut xs, mut ys) = ([0; LANES], [0; LANES]);
+            // SAFETY: the processor has AVX2, asked for above.
+            unsafe { positions(&cells, start, &places, [700, -30], &mut xs, &mut ys) };
+            for (i, [cell, way]) in places.into_iter().enumerate() {
+                let cell = usize::from(cell) - start;
+                let [dx, dy] =
+                    cells.map(|cells| lerp(cells[cell], cells[cell + 1], i32::from(way)));
+                assert_eq!(
+                    [xs[i], ys[i]],
+                    [700 + 256 * i as i32 - dx, -30 - dy],
+                    "case {case}, {i}"
+                );
+            }
+        }
+    }
+}
