@@ -463,3 +463,18 @@ fn the_schemas_in_the_file_are_valid_json_or_text() {
         assert!(json.get(required.as_str().unwrap()).is_some(), "{required}");
     }
 }
+
+/// A capture of version 1 in the repository: what was recorded once stays readable.
+#[test]
+fn the_capture_in_the_repository_is_still_read() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures/captures/version-1.mcap");
+    if std::env::var_os("FOREFRAME_BLESS").is_some() {
+        std::fs::write(path, written(&samples(3), Coding::SMALL)).unwrap();
+    }
+    let capture = Capture::open(std::path::Path::new(path)).unwrap();
+    assert_eq!(capture.frame_count(), 3);
+    assert!(!capture.info().unwrap().is_truncated(), "the file is whole");
+    for (frame, sample) in capture.frames().zip(samples(3)) {
+        assert_is_sample(&frame.unwrap(), &sample);
+    }
+}
