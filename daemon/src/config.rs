@@ -17,6 +17,7 @@ use serde::{Deserialize, Deserializer};
 /// Arguments of `foreframed` and of `foreframe serve`.
 #[derive(clap::Args, Deserialize, Clone, Debug, Default)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[group(id = "daemon")]
 pub struct Args {
     /// Socket to listen on [default: foreframe/foreframe-0 in XDG_RUNTIME_DIR]
     #[arg(long, value_name = "PATH")]

@@ -71,3 +71,41 @@ impl Cli {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory as _;
+
+    use super::*;
+
+    /// Command lines of `foreframe` in the fenced blocks of a document.
+    fn commands(document: &str) -> Vec<Vec<String>> {
+        let lines = document.split("```").skip(1).step_by(2).flat_map(str::lines);
+        let words = |line: &str| {
+            let command = line.split('#').next().unwrap_or_default();
+            command.split_whitespace().map(str::to_owned).collect::<Vec<_>>()
+        };
+        lines.filter(|line| line.starts_with("foreframe ")).map(words).collect()
+    }
+
+    #[test]
+    fn the_definitions_are_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn every_command_line_of_the_readme_is_one_that_exists() {
+        let commands = commands(include_str!("../../README.md"));
+        assert!(commands.len() >= 7, "found {}", commands.len());
+        for command in commands {
+            let parsed = Cli::try_parse_from(&command);
+            assert!(parsed.is_ok(), "{}: {}", command.join(" "), parsed.unwrap_err());
+        }
+    }
+
+    #[test]
+    fn a_command_line_with_an_unknown_option_would_be_found() {
+        let document = "```\nforeframe info x.mcap --speed 3   # no such option\n```";
+        assert!(Cli::try_parse_from(&commands(document)[0]).is_err());
+    }
+}
