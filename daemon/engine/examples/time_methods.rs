@@ -87,7 +87,13 @@ fn time(
         }),
         ..StreamFormat::rgba8(width, height)
     };
-    let config = EngineConfig { method, threads, pixels_per_degree: None, timer: now };
+    let config = EngineConfig {
+        method,
+        threads,
+        pixels_per_degree: None,
+        timer: now,
+        worker_started: || (),
+    };
     let mut engine = Engine::new(format, config);
     let planes = planes(width, height, still);
     let plane = |bytes, width: u32, height: u32, bytes_per_pixel: u32| PlaneInput {

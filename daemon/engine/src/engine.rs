@@ -4,6 +4,7 @@
 //! every buffer has its size, neither a key nor a frame allocates pixels.
 
 use std::num::NonZeroUsize;
+use std::sync::Arc;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -29,6 +30,8 @@ pub struct EngineConfig {
     /// Pixels per degree of visual angle. Turns on the damping of motion that no eye can follow;
     /// None leaves motion as it is.
     pub pixels_per_degree: Option<f32>,
+    /// Runs on each worker thread when it starts, for a priority that the engine knows nothing of.
+    pub worker_started: fn(),
     /// Reads the clock that the times in reports come from. A constant in deterministic replay.
     pub timer: fn() -> MonoTime,
 }
@@ -74,7 +77,7 @@ pub struct FrameReport {
 pub struct Engine {
     format: StreamFormat,
     config: EngineConfig,
-    pool: ThreadPool,
+    pool: Arc<ThreadPool>,
     newest: Option<KeyFrame>,
     previous: Option<KeyFrame>,
     /// A key frame that is no longer needed, whose buffers the next one takes over.
@@ -100,7 +103,7 @@ impl Engine {
         Self {
             format,
             config,
-            pool: start_pool(config.threads.get()),
+            pool: Arc::new(start_pool(config.threads.get(), config.worker_started)),
             newest: None,
             previous: None,
             spare: KeyFrame::default(),
@@ -132,6 +135,12 @@ impl Engine {
     /// stream's format or hold what cannot be converted. The keys already taken in stay as they
     /// were.
     pub fn push_key(&mut self, input: &KeyInput<'_>) -> Result<KeyReport, DecodeError> {
+        // The pool is entered once: steps within it do not wake threads again.
+        let pool = Arc::clone(&self.pool);
+        pool.install(|| self.take_key(input))
+    }
+
+    fn take_key(&mut self, input: &KeyInput<'_>) -> Result<KeyReport, DecodeError> {
         let started_at = (self.config.timer)();
         if let Some(newest) = self.newest.as_ref().map(|key| key.content_time)
             && input.content_time <= newest
@@ -182,6 +191,11 @@ impl Engine {
         content_time: MonoTime,
         out: &mut ColorPlane,
     ) -> Option<FrameReport> {
+        let pool = Arc::clone(&self.pool);
+        pool.install(|| self.make(content_time, out))
+    }
+
+    fn make(&mut self, content_time: MonoTime, out: &mut ColorPlane) -> Option<FrameReport> {
         let started_at = (self.config.timer)();
         let key = self.newest.as_ref()?;
         let phase = match key.motion_span() {
@@ -229,12 +243,13 @@ impl Engine {
 }
 
 /// A pool of `threads`, or of as many as the system starts.
-fn start_pool(threads: usize) -> ThreadPool {
+fn start_pool(threads: usize, started: fn()) -> ThreadPool {
     (1..=threads)
         .rev()
         .find_map(|threads| {
             let name = |index| format!("foreframe-{index}");
-            ThreadPoolBuilder::new().num_threads(threads).thread_name(name).build().ok()
+            let pool = ThreadPoolBuilder::new().num_threads(threads).thread_name(name);
+            pool.start_handler(move |_| started()).build().ok()
         })
         .expect("a system that runs this thread can start one more")
 }

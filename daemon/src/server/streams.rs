@@ -99,6 +99,7 @@ impl Server {
                     threads: config.threads,
                     pixels_per_degree: config.pixels_per_degree,
                     timer: clock::now,
+                    worker_started: thread::ask_for_real_time_work,
                 },
                 refresh_interval: config.refresh_interval,
                 display_origin: self.display_origin,

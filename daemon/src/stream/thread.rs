@@ -1,11 +1,12 @@
 //! The thread of a stream: waits for keys and for the pacer's wakes, and carries things to and fro.
 //!
 //! Between two keys there is always a picture, so that keys that come faster than they can be worked
-//! off do not keep the display from changing; the mailbox keeps the newest meanwhile. Nothing here waits for anybody: sinks, recorder, subscribers and
-//! main loop are all behind queues or slots that can be full.
+//! off do not keep the display from changing; the mailbox keeps the newest meanwhile. Nothing here
+//! waits for anybody: sinks, recorder, subscribers and main loop are all behind queues or slots
+//! that can be full.
 
 use std::io;
-use std::sync::Arc;
+use std::sync::{Arc, Once};
 use std::thread::{self, JoinHandle};
 
 use calloop::channel::Sender;
@@ -13,6 +14,10 @@ use foreframe_engine::pacing::Plan;
 use foreframe_engine::{MonoSpan, MonoTime};
 use foreframe_protocol::{
     CreateStream, ErrorCode, ErrorMessage, OutputFrame, OutputKind, Pacing, Presented, Statistics,
+};
+use thread_priority::{
+    RealtimeThreadSchedulePolicy, ThreadPriority, ThreadPriorityValue, ThreadSchedulePolicy,
+    set_thread_priority_and_policy, thread_native_id,
 };
 use tracing::{debug, error, info, trace, warn};
 
@@ -317,22 +322,28 @@ fn plane_error((field, expected, found): (String, String, String)) -> ErrorMessa
 
 /// Asks for a priority that keeps wakes on time on a busy machine. Many machines do not grant it.
 fn ask_for_real_time() {
-    use std::sync::Once;
-    use thread_priority::{
-        RealtimeThreadSchedulePolicy, ThreadPriority, ThreadPriorityValue, ThreadSchedulePolicy,
-        set_thread_priority_and_policy, thread_native_id,
-    };
     static SAID: Once = Once::new();
-    let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
-    let priority = ThreadPriorityValue::try_from(REAL_TIME_PRIORITY)
-        .expect("the value is below 100, the highest that there is");
-    let asked = set_thread_priority_and_policy(
-        thread_native_id(),
-        ThreadPriority::Crossplatform(priority),
-        policy,
-    );
+    let asked = set_real_time(REAL_TIME_PRIORITY);
     SAID.call_once(|| match asked {
         Ok(()) => info!("streams run with real-time priority"),
         Err(error) => info!(%error, "streams run without real-time priority"),
     });
+}
+
+/// Asks the same for a worker of the engine, one below the thread that waits for it.
+pub fn ask_for_real_time_work() {
+    if let Err(error) = set_real_time(REAL_TIME_PRIORITY - 1) {
+        debug!(%error, "a worker runs without real-time priority");
+    }
+}
+
+fn set_real_time(priority: u8) -> Result<(), thread_priority::Error> {
+    let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
+    let priority = ThreadPriorityValue::try_from(priority)
+        .expect("the value is below 100, the highest that there is");
+    set_thread_priority_and_policy(
+        thread_native_id(),
+        ThreadPriority::Crossplatform(priority),
+        policy,
+    )
 }

@@ -15,8 +15,7 @@ use super::rehearsal::Rehearsal;
 use crate::draw::Rgba8Image;
 use crate::pictures::{ContactSheetRow, PresentKind, TimelineEvent, contact_sheet, timeline};
 
-/// Part of the show that the timeline draws: after the pacer has settled, 0.4 s.
-const TIMELINE_FROM: MonoSpan = MonoSpan::from_ms(1000);
+/// Part of the show that the timeline draws: 0.4 s from the second third on.
 const TIMELINE_SPAN: MonoSpan = MonoSpan::from_ms(400);
 
 /// The demo's result. Times in milliseconds are medians unless their name says otherwise.
@@ -136,8 +135,8 @@ impl Summary {
             ),
             format!("content judder      {:.4} of a refresh interval", self.content_judder),
             format!(
-                "error of in-betweens {:.1} dB PSNR on average, {:.1} dB at worst, {} compared",
-                self.psnr_rgb_db, self.psnr_rgb_min_db, self.compared
+                "error               {:.1} dB PSNR on average, {:.1} dB at worst, {} of {} in-betweens compared",
+                self.psnr_rgb_db, self.psnr_rgb_min_db, self.compared, self.synthesised
             ),
             format!("real frames changed {}", self.real_frames_changed),
             format!(
@@ -192,7 +191,7 @@ impl Summary {
             let key = rehearsal.keys.get(usize::try_from(shown.key_index).ok()?)?;
             Some(ContactSheetRow {
                 label: format!("key {}, phase {:.2}", shown.key_index, shown.phase),
-                detail: format!("{:.1} dB", psnr_rgb_db(&kept.rgba, &without_alpha(truth))),
+                detail: format!("{:.1} dB", psnr_rgb_db(&kept.rgba, &without_alpha(truth), 1)),
                 key: image(&key.color.rgba)?,
                 in_between: image(&kept.rgba)?,
                 truth: image(truth)?,
@@ -225,7 +224,8 @@ fn compared(seen: &Seen, rehearsal: &Rehearsal) -> Vec<f64> {
         return on_grid;
     }
     let against_truth = |kept: &Kept| {
-        psnr_rgb_db(&kept.rgba, &without_alpha(&rehearsal.render_truth(kept.shown.content_ns)))
+        let truth = rehearsal.render_truth(kept.shown.content_ns);
+        psnr_rgb_db(&kept.rgba, &without_alpha(&truth), 1)
     };
     seen.kept.iter().map(against_truth).collect()
 }
@@ -257,8 +257,10 @@ fn content_judder(frames: &[Shown], refresh_hz: f64) -> f64 {
 }
 
 fn events(submissions: &Submissions, seen: &Seen, rehearsal: &Rehearsal) -> Vec<TimelineEvent> {
-    let Some(first) = seen.frames.first() else { return Vec::new() };
-    let start = first.present_at + TIMELINE_FROM;
+    let (Some(first), Some(last)) = (seen.frames.first(), seen.frames.last()) else {
+        return Vec::new();
+    };
+    let start = first.present_at + (last.present_at - first.present_at).scale(1, 3);
     let at_ms = |time: MonoTime| (time - start).as_ms_f64();
     let start_content_ns = (start - first.present_at).as_ns() as f64 + first.content_ns as f64;
     let content_ms = |content_ns: u64| (content_ns as f64 - start_content_ns) / 1e6;

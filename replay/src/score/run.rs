@@ -117,6 +117,7 @@ fn engine_of(method: Method, format: StreamFormat, options: &ScoreOptions) -> En
         // Damping is for eyes, and the metrics have none.
         pixels_per_degree: None,
         timer: options.timer,
+        worker_started: || (),
     };
     Engine::new(format, config)
 }

@@ -146,6 +146,7 @@ impl VirtualStream {
                     threads: config.threads,
                     pixels_per_degree: None,
                     timer: || MonoTime::ZERO,
+                    worker_started: || (),
                 },
                 refresh_interval,
                 display_origin: origin,

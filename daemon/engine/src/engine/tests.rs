@@ -22,8 +22,13 @@ fn format() -> StreamFormat {
 
 fn engine(method: Method) -> Engine {
     let threads = NonZeroUsize::MIN;
-    let config =
-        EngineConfig { method, threads, pixels_per_degree: None, timer: || MonoTime::ZERO };
+    let config = EngineConfig {
+        method,
+        threads,
+        pixels_per_degree: None,
+        timer: || MonoTime::ZERO,
+        worker_started: || (),
+    };
     Engine::new(format(), config)
 }
 
