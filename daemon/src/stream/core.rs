@@ -140,17 +140,17 @@ impl StreamCore {
         }
     }
 
-    /// Takes in a key that arrived at `arrived_at`.
+    /// Takes in a key. `clock` says when that is done: from then on it can be shown.
     ///
     /// # Errors
     /// If it contradicts its stream. The keys before it stay.
     pub fn on_key(
         &mut self,
         input: &KeyInput<'_>,
-        arrived_at: MonoTime,
+        clock: impl Fn() -> MonoTime,
     ) -> Result<KeyReport, DecodeError> {
         let report = self.engine.push_key(input)?;
-        self.pacer.on_key(input.content_time, arrived_at, input.is_cut);
+        self.pacer.on_key(input.content_time, clock(), input.is_cut);
         self.counts.keys += 1;
         self.newest_key = Some(NewestKey {
             index: input.index,
@@ -185,9 +185,10 @@ impl StreamCore {
             self.pacer.on_presented(plan.present_at, plan.present_at);
             return Some(FrameOutcome::Repeated);
         }
+        let started_at = clock();
         let report = self.engine.synthesise(content_time, &mut self.frame)?;
         let ready_at = clock();
-        self.pacer.on_work(ready_at - plan.wake_at);
+        self.pacer.on_work(ready_at - plan.wake_at.min(started_at));
         let presented_at = self.display.refresh_at_or_after(ready_at);
         if presented_at > plan.present_at {
             self.pacer.on_dropped();

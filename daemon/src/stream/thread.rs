@@ -95,6 +95,8 @@ struct StreamThread {
     owes_picture: bool,
     refused: u64,
     repeats_in_a_row: u32,
+    /// What taking in the newest key took.
+    key_work: MonoSpan,
     synthesis: Mean,
     statistics_due_at: MonoTime,
 }
@@ -124,6 +126,7 @@ impl StreamThread {
             owes_picture: false,
             refused: 0,
             repeats_in_a_row: 0,
+            key_work: MonoSpan::ZERO,
             synthesis: Mean::default(),
             statistics_due_at: clock::now(),
         }
@@ -138,7 +141,10 @@ impl StreamThread {
         loop {
             match mailbox.take() {
                 Taken::Closed => break,
-                Taken::Key(submission) => self.take_key(&submission),
+                Taken::Key(submission) => {
+                    self.make_picture_first();
+                    self.take_key(&submission);
+                }
                 Taken::Nothing => {}
             }
             let plan = self.core.plan(clock::now());
@@ -162,7 +168,21 @@ impl StreamThread {
         self.send_statistics();
     }
 
+    /// Makes the next picture from the keys so far, if taking in the one that waits would cost its
+    /// refresh: that refresh could not show the new key anyway.
+    fn make_picture_first(&mut self) {
+        let now = clock::now();
+        let plan = self.core.plan(now);
+        let budget = plan.present_at - plan.wake_at;
+        let is_at_stake = now + self.key_work + budget > plan.present_at;
+        let is_idle = plan.content_time.is_none() || self.repeats_in_a_row >= REPEATS_BEFORE_IDLE;
+        if is_at_stake && !is_idle {
+            self.make_frame(&plan);
+        }
+    }
+
     fn take_key(&mut self, submission: &Submission) {
+        let started_at = clock::now();
         let Submission { submit, arrived_at, pool, slot_offset } = submission;
         let format = &self.parts.create.format;
         let copied = self.copier.copy(format, submit, pool, *slot_offset);
@@ -180,13 +200,14 @@ impl StreamThread {
             Ok(input) => input,
             Err(error) => return self.refuse(plane_error(error.parts())),
         };
-        match self.core.on_key(&input, *arrived_at) {
+        match self.core.on_key(&input, clock::now) {
             Ok(report) => trace!(key = submit.key_index, work = %report.work, "key taken in"),
             Err(error) => {
                 let parts = ("planes".to_owned(), "what the stream declares".to_owned());
                 return self.refuse(plane_error((parts.0, parts.1, error.to_string())));
             }
         }
+        self.key_work = clock::now() - started_at;
         self.repeats_in_a_row = 0;
         self.owes_picture = true;
         self.unshown =

@@ -100,7 +100,7 @@ pub fn replay(
         {
             clock = clock.max(key.arrives_at);
             last_arrivals = [last_arrivals[1], key.arrives_at];
-            if let Err(error) = stream.core.on_key(&key.frame.as_input(), key.arrives_at) {
+            if let Err(error) = stream.core.on_key(&key.frame.as_input(), || key.arrives_at) {
                 losses.refused.push(format!("key {}: {error}", key.frame.index));
             }
             next = keys.next().transpose()?;
