@@ -28,7 +28,10 @@ pub enum Error {
     #[error("the daemon refuses the session: {}", describe(.0))]
     Rejected(Reject),
     /// The daemon refuses something that was sent.
-    #[error("the daemon found a mistake in {}: expected {}, found {}", .0.field, .0.expected, .0.found)]
+    #[error(
+        "the daemon found a mistake in {}: expected {}, found {}",
+        .0.field, .0.expected, .0.found
+    )]
     Refused(ErrorMessage),
     /// There is no such stream, or it has ended.
     #[error("expected a stream that is open, found stream {stream}")]

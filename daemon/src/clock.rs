@@ -32,7 +32,8 @@ pub fn sleep_until(deadline: MonoTime) {
     while clock_nanosleep_absolute(ClockId::Monotonic, &request) == Err(Errno::INTR) {}
 }
 
-/// Wakes a thread that waits in [`Alarm::wait`]. Wakes that nobody has waited for yet add up to one.
+/// Wakes a thread that waits in [`Alarm::wait`]. Wakes that nobody has waited for yet add up to
+/// one.
 #[derive(Debug)]
 pub struct Waker {
     event: OwnedFd,

@@ -1,8 +1,9 @@
-//! The daemon: sessions, engine threads, sinks, recorder. The only place with clocks, sockets and logs.
+//! The daemon: sessions, engine threads, sinks, recorder. The only place with clocks, sockets and
+//! logs.
 //!
 //! A key frame comes in over a client's socket ([`session`]), is checked by the main loop
-//! ([`server`]), copied and turned into pictures by the thread of its [`stream`], and leaves through
-//! a [`sink`] or to subscribers. The [`recorder`] keeps what came in as a [`capture`].
+//! ([`server`]), copied and turned into pictures by the thread of its [`stream`], and leaves
+//! through a [`sink`] or to subscribers. The [`recorder`] keeps what came in as a [`capture`].
 //! [`ingest`] translates the protocol's words into the engine's, [`clock`] is the only reader of
 //! clocks, [`config`] says what was asked for.
 

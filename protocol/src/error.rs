@@ -1,4 +1,5 @@
-//! The one error of this crate. Whatever a peer can cause names what was expected and what was found.
+//! The one error of this crate. Whatever a peer can cause names what was expected and what was
+//! found.
 
 use std::io;
 use std::path::PathBuf;

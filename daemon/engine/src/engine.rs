@@ -92,8 +92,6 @@ struct Scratch {
     map: FieldMap,
     grid: GridScratch,
     linear: LinearScratch,
-    /// Content time of the key that `linear` has taken.
-    linear_key: Option<MonoTime>,
 }
 
 impl Engine {
@@ -115,17 +113,6 @@ impl Engine {
     #[must_use]
     pub fn format(&self) -> &StreamFormat {
         &self.format
-    }
-
-    /// The newest key, in the engine's convention.
-    #[must_use]
-    pub fn newest_key(&self) -> Option<&KeyFrame> {
-        self.newest.as_ref()
-    }
-
-    /// Changes the method from the next frame on.
-    pub fn set_method(&mut self, method: Method) {
-        self.config.method = method;
     }
 
     /// Takes in a key frame. The one before it becomes the previous key, unless this is a cut.
@@ -167,7 +154,6 @@ impl Engine {
             self.scratch.map.update(key.valid, cells, key.field_offset);
             if self.config.method == Method::Linear {
                 self.scratch.linear.take_key(&self.pool, &key);
-                self.scratch.linear_key = Some(key.content_time);
             }
         }
         self.scratch.grid.forget_key();
@@ -213,12 +199,8 @@ impl Engine {
                 warp::grid::warp_grid(key, phase, out, &mut self.scratch.grid, &self.pool);
             }
             Method::Linear => {
-                let Scratch { map, linear, linear_key, .. } = &mut self.scratch;
-                // A key that arrived under another method.
-                if *linear_key != Some(key.content_time) {
-                    linear.take_key(&self.pool, key);
-                    *linear_key = Some(key.content_time);
-                }
+                // A phase other than 0 needs motion, and with motion `linear` has taken the key.
+                let Scratch { map, linear, .. } = &mut self.scratch;
                 warp::linear::warp_linear(&self.pool, key, map, phase, linear, out);
             }
             Method::Hold => out.copy_from(&key.color),

@@ -38,7 +38,8 @@ pub enum DepthFormat {
     F16,
     /// 16-bit unsigned, normalised to 0..1.
     U16,
-    /// 24-bit unsigned in the low bits of a 32-bit word, normalised to 0..1. The top byte is ignored.
+    /// 24-bit unsigned in the low bits of a 32-bit word, normalised to 0..1. The top byte is
+    /// ignored.
     U24,
 }
 

@@ -5,8 +5,8 @@
 //! small messages, skips pixels, and takes a few reads per frame. What it acts on is checked:
 //! session, streams and gaps by the CRC of their chunk or their own hash, frame records by theirs.
 //!
-//! [`super::walk`] does the walking; here is what it finds, and what must hold before it starts: the
-//! file is an MCAP file, a capture, and of a version that is understood.
+//! [`super::walk`] does the walking; here is what it finds, and what must hold before it starts:
+//! the file is an MCAP file, a capture, and of a version that is understood.
 
 use std::collections::BTreeMap;
 use std::io;

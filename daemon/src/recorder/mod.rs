@@ -1,9 +1,9 @@
 //! Records what applications send, on a thread of its own, behind a bounded queue.
 //!
-//! Guarantees that no stream ever waits for the disk: with the queue full a key is not recorded, and
-//! the file says so in a gap record in front of the next key that is. Every key is in the file when
-//! the writer turns to the next one, so a daemon that is killed leaves a capture that opens up to
-//! its last whole key.
+//! Guarantees that no stream ever waits for the disk: with the queue full a key is not recorded,
+//! and the file says so in a gap record in front of the next key that is. Every key is in the file
+//! when the writer turns to the next one, so a daemon that is killed leaves a capture that opens up
+//! to its last whole key.
 
 use std::io;
 use std::path::Path;
@@ -67,8 +67,8 @@ impl Recorder {
         Ok(Self { jobs: Some(jobs), thread: Some(thread) })
     }
 
-    /// The end of a stream that is called `number` in the file, where no other one is. None once the
-    /// recording is over.
+    /// The end of a stream that is called `number` in the file, where no other one is. None once
+    /// the recording is over.
     #[must_use]
     pub fn stream(&self, number: u32) -> Option<StreamRecorder> {
         Some(StreamRecorder { jobs: self.jobs.clone()?, number, gap: None })

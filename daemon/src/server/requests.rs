@@ -1,7 +1,7 @@
 //! What each message of a client leads to.
 //!
-//! A message was checked field by field when it was parsed; here is checked whether it fits what the
-//! client has: its streams, slots, pools and quotas. Messages for a stream that has ended are
+//! A message was checked field by field when it was parsed; here is checked whether it fits what
+//! the client has: its streams, slots, pools and quotas. Messages for a stream that has ended are
 //! refused without an end of the session: they may have crossed the news.
 
 use std::os::fd::OwnedFd;

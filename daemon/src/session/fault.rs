@@ -1,5 +1,5 @@
-//! What a client did wrong, on its way to the client: an error message that ends the session, or one
-//! that does not.
+//! What a client did wrong, on its way to the client: an error message that ends the session, or
+//! one that does not.
 //!
 //! Fatal is what no client does that keeps to the protocol. Not fatal is what a well-meant request
 //! can run into: a key whose planes do not fit, a quota, a stream that has just ended.

@@ -1,8 +1,8 @@
 //! A slow sink on a thread of its own, behind a bounded queue.
 //!
-//! Guarantees that the stream's thread never waits for a disk or a pipe: with the queue full a frame
-//! is left out of the file and counted. Frames change hands without a copy: the stream gives its
-//! picture away and gets an empty one back.
+//! Guarantees that the stream's thread never waits for a disk or a pipe: with the queue full a
+//! frame is left out of the file and counted. Frames change hands without a copy: the stream gives
+//! its picture away and gets an empty one back.
 
 use std::io;
 use std::sync::Arc;

@@ -1,4 +1,5 @@
-//! YUV4MPEG2: one header, then raw frames at a constant rate. `ffmpeg -i FILE` and `mpv FILE` read it.
+//! YUV4MPEG2: one header, then raw frames at a constant rate. `ffmpeg -i FILE` and `mpv FILE` read
+//! it.
 //!
 //! 8-bit 4:4:4 (`C444`), limited range, BT.709 matrix (ITU-R BT.709-6, 2015, sections 3 and 4). No
 //! chroma is thrown away, so odd sizes need no rule and no chroma siting has to be guessed.
@@ -8,8 +9,8 @@
 //! (2) `Cb = 128 + (-6596 R - 22189 G + 28785 B) / 65536`
 //! (3) `Cr = 128 + (28784 R - 26145 G -  2639 B) / 65536`
 //!
-//! The coefficients are 219/255 and 224/255 times those of the standard, rounded so that (1) sums to
-//! 219/255 and (2) and (3) to 0: white is 235, and grey has no colour.
+//! The coefficients are 219/255 and 224/255 times those of the standard, rounded so that (1) sums
+//! to 219/255 and (2) and (3) to 0: white is 235, and grey has no colour.
 
 use std::io::{self, Write};
 
@@ -61,7 +62,8 @@ impl<W: Write> Y4mSink<W> {
         self.repeat()
     }
 
-    /// Writes the last frame again, for a refresh that showed nothing new. Nothing before the first.
+    /// Writes the last frame again, for a refresh that showed nothing new. Nothing before the
+    /// first.
     ///
     /// # Errors
     /// As [`Self::write`].

@@ -1,7 +1,8 @@
 //! Hands key frames from the main loop to the stream's thread: one place, newest wins.
 //!
 //! Owns the slots of the stream: to put a key frame in is to submit its slot, to take it out is to
-//! latch it. What is in the box when the next one comes was never looked at, and its slot goes back.
+//! latch it. What is in the box when the next one comes was never looked at, and its slot goes
+//! back.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 

@@ -1,8 +1,8 @@
 //! Output frames for one subscriber: slots of a pool that the daemon writes and the subscriber maps
 //! read-only.
 //!
-//! A slot is free, being written, or lent to the subscriber. A subscriber that gives none back loses
-//! frames, which are counted; nobody waits for it.
+//! A slot is free, being written, or lent to the subscriber. A subscriber that gives none back
+//! loses frames, which are counted; nobody waits for it.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 

@@ -1,9 +1,9 @@
 //! The thread of a stream: waits for keys and for the pacer's wakes, and carries things to and fro.
 //!
-//! Between two keys there is always a picture, so that keys that come faster than they can be worked
-//! off do not keep the display from changing; the mailbox keeps the newest meanwhile. Nothing here
-//! waits for anybody: sinks, recorder, subscribers and main loop are all behind queues or slots
-//! that can be full.
+//! Between two keys there is always a picture, so that keys that come faster than they can be
+//! worked off do not keep the display from changing; the mailbox keeps the newest meanwhile.
+//! Nothing here waits for anybody: sinks, recorder, subscribers and main loop are all behind queues
+//! or slots that can be full.
 
 use std::io;
 use std::sync::{Arc, Once};

@@ -4,8 +4,8 @@
 //!   becomes `rgba8`, exactly; else it stays `rgba16f`.
 //! - Depth `ViewLayer.Depth.Z` is planar, along the view axis, positive.
 //! - Motion `ViewLayer.Vector.{X,Y}` is previous minus current position, pixels, **y up**. It is
-//!   kept bit for bit and declared as such. `Z` and `W` are the way to the *next* frame and are never read:
-//!   no program that extrapolates could know them.
+//!   kept bit for bit and declared as such. `Z` and `W` are the way to the *next* frame and are
+//!   never read: no program that extrapolates could know them.
 //! - Vectors at the clip value of the renderer are meaningless (the point was behind the camera)
 //!   and become NaN: no motion is known. Background has zero vectors whatever the camera does; its
 //!   true motion is put in from the cameras of the two frames ([`SkyMotion`]), or NaN where the

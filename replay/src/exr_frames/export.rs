@@ -1,9 +1,9 @@
 //! A capture becomes a folder of EXR frames and side-cars.
 //!
-//! One EXR per frame: `R G B A`, `Z`, `backward.u/.v`, scanlines, ZIP16. Planes of another size than
-//! colour stand in parts of their own. Colour of 8 bits is written as linear halves, which every
-//! program shows right and which lead back to the very levels; everything else keeps its bits.
-//! Matrices, units and conventions are attributes of the image and fields of the side-car.
+//! One EXR per frame: `R G B A`, `Z`, `backward.u/.v`, scanlines, ZIP16. Planes of another size
+//! than colour stand in parts of their own. Colour of 8 bits is written as linear halves, which
+//! every program shows right and which lead back to the very levels; everything else keeps its
+//! bits. Matrices, units and conventions are attributes of the image and fields of the side-car.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,8 +1,8 @@
 //! This test program again, as a second process that can be killed.
 //!
 //! A file that uses it has a test named `child_process` that calls [`run_if_asked`]. In an ordinary
-//! run that does nothing; in a child it becomes the daemon, or the client, that the environment asks
-//! for.
+//! run that does nothing; in a child it becomes the daemon, or the client, that the environment
+//! asks for.
 
 use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::Path;

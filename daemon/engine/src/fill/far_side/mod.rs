@@ -11,7 +11,8 @@
 //! ```
 //!
 //! At the border of the image a side is missing: a run is then counted as twice the way to the
-//! other one, and as what is missing may be the far one, the other axis takes part in (3). A grid without any resolved cell has no far side: [`NO_CELL`].
+//! other one, and as what is missing may be the far one, the other axis takes part in (3). A grid
+//! without any resolved cell has no far side: [`NO_CELL`].
 //! Exactness: `Exact`.
 
 mod cpu;

@@ -71,7 +71,8 @@ impl GridScratch {
 /// Makes the in-between frame at `phase` after `key` into `out`.
 ///
 /// Without usable motion the key is copied. Pixels outside `key.valid` are always copied. A key
-/// without depth has the same depth everywhere. `scratch` has been told of each change of key. The result does not depend on the threads of `pool`.
+/// without depth has the same depth everywhere. `scratch` has been told of each change of key. The
+/// result does not depend on the threads of `pool`.
 ///
 /// # Panics
 /// If `out` does not have the size and format of the key's colour, or a non-empty depth does not

@@ -1,7 +1,8 @@
 //! One triangle of the warped mesh: which pixels it covers and where they come from.
 //!
 //! Corners are in 1/16 px; everything is relative to a corner or to the triangle's first pixel, so
-//! that edge functions stay within 30 bits. Positive orientation is clockwise on the screen (y down).
+//! that edge functions stay within 30 bits. Positive orientation is clockwise on the screen (y
+//! down).
 
 use super::mesh::MeshTriangle;
 
@@ -123,7 +124,8 @@ fn floor_div(value: i32, divisor: i32) -> i32 {
 /// The affine map from target to source of one triangle, equation (2).
 ///
 /// Kept relative to the first corner in 2^-24 px, which reaches +-127 px: more than a cell before
-/// the warp. Sums wrap: a gradient of a sliver may overflow, the result inside the triangle does not.
+/// the warp. Sums wrap: a gradient of a sliver may overflow, the result inside the triangle does
+/// not.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SourceMap {
     moved: Point,
