@@ -8,6 +8,8 @@ use std::sync::Arc;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
+use crate::backend::FrameInput;
+use crate::backend::cpu::CpuBackend;
 use crate::color::ColorPlane;
 use crate::decode::{DecodeError, DecodeScratch, decode_key};
 use crate::field::FieldMap;
@@ -16,9 +18,6 @@ use crate::key::{KeyFrame, KeyInput};
 use crate::method::Method;
 use crate::phase::Phase;
 use crate::time::{MonoSpan, MonoTime};
-use crate::warp;
-use crate::warp::grid::GridScratch;
-use crate::warp::linear::LinearScratch;
 
 /// What an engine does and with how much of the machine.
 #[derive(Clone, Copy, Debug)]
@@ -83,6 +82,7 @@ pub struct Engine {
     /// A key frame that is no longer needed, whose buffers the next one takes over.
     spare: KeyFrame,
     scratch: Scratch,
+    cpu: CpuBackend,
 }
 
 /// Buffers of the steps, kept from frame to frame.
@@ -90,8 +90,6 @@ pub struct Engine {
 struct Scratch {
     decode: DecodeScratch,
     map: FieldMap,
-    grid: GridScratch,
-    linear: LinearScratch,
 }
 
 impl Engine {
@@ -106,6 +104,7 @@ impl Engine {
             previous: None,
             spare: KeyFrame::default(),
             scratch: Scratch::default(),
+            cpu: CpuBackend::default(),
         }
     }
 
@@ -152,11 +151,8 @@ impl Engine {
         if !key.velocity.data().is_empty() {
             let cells = [key.velocity.width(), key.velocity.height()];
             self.scratch.map.update(key.valid, cells, key.field_offset);
-            if self.config.method == Method::Linear {
-                self.scratch.linear.take_key(&self.pool, &key);
-            }
         }
-        self.scratch.grid.forget_key();
+        self.cpu.take_key(&self.pool, self.config.method, &key);
         let newest = self.newest.replace(key);
         let dropped = std::mem::replace(&mut self.previous, newest);
         self.spare = dropped.unwrap_or_default();
@@ -189,38 +185,23 @@ impl Engine {
             None => Phase::ZERO,
         };
         out.reset(key.color.format(), key.color.width(), key.color.height());
-        match self.config.method {
-            Method::Blend => self.blend(content_time, out),
-            _ if phase == Phase::ZERO => out.copy_from(&key.color),
-            Method::Gather => {
-                warp::gather::warp_gather(&self.pool, key, &self.scratch.map, phase, out);
-            }
-            Method::Grid => {
-                warp::grid::warp_grid(key, phase, out, &mut self.scratch.grid, &self.pool);
-            }
-            Method::Linear => {
-                // A phase other than 0 needs motion, and with motion `linear` has taken the key.
-                let Scratch { map, linear, .. } = &mut self.scratch;
-                warp::linear::warp_linear(&self.pool, key, map, phase, linear, out);
-            }
-            Method::Hold => out.copy_from(&key.color),
+        let (newest_at, previous) = (key.content_time, self.previous.as_ref());
+        let shown = match (self.config.method, previous) {
+            (Method::Blend, Some(older)) if content_time <= older.content_time => Some(older),
+            (Method::Blend, Some(_)) if content_time < newest_at => None,
+            (Method::Hold | Method::Blend, _) => Some(key),
+            _ if phase == Phase::ZERO => Some(key),
+            _ => None,
+        };
+        if let Some(shown) = shown {
+            out.copy_from(&shown.color);
+        } else {
+            let method = self.config.method;
+            let map = &self.scratch.map;
+            let frame = FrameInput { method, phase, newest: key, previous, map };
+            self.cpu.make(&self.pool, &frame, out);
         }
         Some(FrameReport { key_index: key.index, phase, work: (self.config.timer)() - started_at })
-    }
-
-    /// The mean of both keys strictly between them; the nearer of the two at them and outside.
-    fn blend(&self, content_time: MonoTime, out: &mut ColorPlane) {
-        match (&self.previous, &self.newest) {
-            (Some(older), Some(newer)) if content_time < newer.content_time => {
-                if content_time > older.content_time {
-                    warp::blend::blend(&self.pool, &older.color, &newer.color, out);
-                } else {
-                    out.copy_from(&older.color);
-                }
-            }
-            (_, Some(newest)) => out.copy_from(&newest.color),
-            (_, None) => {}
-        }
     }
 }
 

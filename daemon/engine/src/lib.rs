@@ -11,6 +11,7 @@
 //! Everything after the trajectory is integer arithmetic, so that one input gives one output on
 //! every machine and for any number of threads.
 
+pub mod backend;
 pub mod bands;
 pub mod color;
 pub mod decode;

@@ -1,0 +1,44 @@
+//! The CPU backend: the reference of all others.
+
+use rayon::ThreadPool;
+
+use super::FrameInput;
+use crate::color::ColorPlane;
+use crate::key::KeyFrame;
+use crate::method::Method;
+use crate::warp::blend::blend;
+use crate::warp::gather::warp_gather;
+use crate::warp::grid::{GridScratch, warp_grid};
+use crate::warp::linear::{LinearScratch, warp_linear};
+
+/// Buffers of the steps, kept from frame to frame.
+#[derive(Debug, Default)]
+pub struct CpuBackend {
+    grid: GridScratch,
+    linear: LinearScratch,
+}
+
+impl CpuBackend {
+    /// Prepares for the frames that `method` makes after `key`.
+    pub fn take_key(&mut self, pool: &ThreadPool, method: Method, key: &KeyFrame) {
+        self.grid.forget_key();
+        if method == Method::Linear && !key.velocity.data().is_empty() {
+            self.linear.take_key(pool, key);
+        }
+    }
+
+    /// Makes a picture after the key that was taken last into `out`, which has the size and format of the keys.
+    pub fn make(&mut self, pool: &ThreadPool, frame: &FrameInput<'_>, out: &mut ColorPlane) {
+        let FrameInput { method, phase, newest: key, previous, map } = *frame;
+        match (method, previous) {
+            (Method::Blend, Some(older)) => blend(pool, &older.color, &key.color, out),
+            (Method::Gather, _) => warp_gather(pool, key, map, phase, out),
+            (Method::Grid, _) => warp_grid(key, phase, out, &mut self.grid, pool),
+            (Method::Linear, _) => {
+                // A phase other than 0 needs motion, and with motion `linear` has taken the key.
+                warp_linear(pool, key, map, phase, &mut self.linear, out);
+            }
+            (Method::Hold, _) | (Method::Blend, None) => out.copy_from(&key.color),
+        }
+    }
+}

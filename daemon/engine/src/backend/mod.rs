@@ -1,0 +1,30 @@
+//! Where in-between frames are made.
+//!
+//! The engine decodes keys and quantises trajectories; what follows is integer arithmetic on whole
+//! planes, and runs where a backend says. Every backend makes the same bytes: the CPU is the
+//! reference, others are compared with it.
+//!
+//! A picture that is a key as it is needs no backend: the engine copies it.
+
+pub mod cpu;
+
+use crate::field::FieldMap;
+use crate::key::KeyFrame;
+use crate::method::Method;
+use crate::phase::Phase;
+
+/// What one picture is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct FrameInput<'a> {
+    /// The method, not [`Method::Hold`].
+    pub method: Method,
+    /// Position after `newest`; not 0 with a method that extrapolates, and then `newest` has a
+    /// velocity field.
+    pub phase: Phase,
+    /// The newest key.
+    pub newest: &'a KeyFrame,
+    /// The key before it; present with a method that interpolates.
+    pub previous: Option<&'a KeyFrame>,
+    /// Where the cells of `newest`'s field lie.
+    pub map: &'a FieldMap,
+}
