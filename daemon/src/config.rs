@@ -9,17 +9,18 @@ use std::fs;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::time::Duration;
 
-use anyhow::{Context as _, bail, ensure};
 use foreframe_engine::{Method, MonoSpan};
 use serde::{Deserialize, Deserializer};
+use tracing_subscriber::EnvFilter;
 
 /// Arguments of `foreframed` and of `foreframe serve`.
 #[derive(clap::Args, Deserialize, Clone, Debug, Default)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 #[group(id = "daemon")]
 pub struct Args {
-    /// Socket to listen on [default: foreframe/foreframe-0 in XDG_RUNTIME_DIR]
+    /// Socket to listen on [default: foreframe/daemon.sock in XDG_RUNTIME_DIR]
     #[arg(long, value_name = "PATH")]
     pub socket: Option<PathBuf>,
     /// Where output frames go: null, shm, png:DIR, y4m:PATH, or - for y4m on standard output
@@ -27,7 +28,7 @@ pub struct Args {
     #[arg(long)]
     pub sink: Option<SinkSpec>,
     /// Refresh rate of the output, 1 to 1000 [default: 120]
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub refresh: Option<f64>,
     /// What the engine runs on: auto or cpu [default: auto]
     #[arg(long)]
@@ -40,20 +41,21 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
     /// Threads that share the work of one stream [default: as many as there are processors]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_count)]
     pub threads: Option<NonZeroUsize>,
-    /// Pixels per degree of visual angle; turns on damping of motion that no eye can follow
-    #[arg(long, value_name = "N")]
+    /// Pixels per degree of visual angle, 1 to 1000; turns on damping of motion that no eye can
+    /// follow
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub ppd: Option<f32>,
     /// What to log on standard error: error, warn, info, debug, trace, or a filter such as
     /// foreframed::session=debug [default: info]
     #[arg(long, value_name = "LEVEL")]
     pub log: Option<String>,
-    /// Clients that may be connected at once [default: 16]
-    #[arg(long, value_name = "N")]
+    /// Clients that may be connected at once, 1 to 256 [default: 16]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub max_clients: Option<usize>,
     /// Memory that the streams of one client may cost, in MiB [default: 2048]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub memory_mb: Option<u64>,
     /// TOML file with the same names as these options; an option given here wins
     #[arg(long, value_name = "FILE")]
@@ -75,6 +77,14 @@ pub enum SinkSpec {
     Y4m(PathBuf),
     /// A y4m stream on standard output.
     Y4mStdout,
+}
+
+impl SinkSpec {
+    /// Whether frames reach a file or a pipe, so that a copy of them is worth its price.
+    #[must_use]
+    pub fn keeps_frames(&self) -> bool {
+        !matches!(self, Self::Null | Self::Shm)
+    }
 }
 
 impl FromStr for SinkSpec {
@@ -122,6 +132,14 @@ pub enum Backend {
     Cpu,
 }
 
+/// A count of things of which there is at least one.
+///
+/// # Errors
+/// What was expected and what was found.
+pub fn parse_count(text: &str) -> Result<NonZeroUsize, String> {
+    text.parse().map_err(|_| format!("expected a whole number of 1 or more, found `{text}`"))
+}
+
 fn from_name<'de, D, T>(deserializer: D) -> Result<Option<T>, D::Error>
 where
     D: Deserializer<'de>,
@@ -129,6 +147,17 @@ where
 {
     let name = String::deserialize(deserializer)?;
     name.parse().map(Some).map_err(serde::de::Error::custom)
+}
+
+/// A value on the command line or in the file that cannot be: for the programs, exit code 2. The
+/// text names the option, what was expected and what was found.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct UsageError(pub String);
+
+/// Fails with a [`UsageError`] unless `is_so`.
+fn ensure(is_so: bool, text: impl FnOnce() -> String) -> Result<(), UsageError> {
+    if is_so { Ok(()) } else { Err(UsageError(text())) }
 }
 
 /// Everything the daemon needs to know, checked.
@@ -156,14 +185,21 @@ pub struct Config {
     pub max_clients: usize,
     /// Bytes that the pools and the engines of one client may take.
     pub memory_per_client: u64,
+    /// How long the end of a stream waits for its sink, and the end of the daemon for the
+    /// recording, before what is not written is given up. No option: nobody should have to think
+    /// of it.
+    pub stop_within: Duration,
 }
+
+/// Ample for a few frames on a slow disk, and short of what makes people reach for `kill -9`.
+const STOP_WITHIN: Duration = Duration::from_secs(5);
 
 impl Args {
     /// Reads the file that `--config` names, fills in the defaults and checks every value.
     ///
     /// # Errors
     /// If the file cannot be read or holds an unknown name, or a value is out of its range.
-    pub fn resolve(self) -> anyhow::Result<Config> {
+    pub fn resolve(self) -> Result<Config, UsageError> {
         let args = match &self.config {
             Some(path) => {
                 let file = read_file(path)?;
@@ -192,28 +228,28 @@ impl Args {
         }
     }
 
-    fn check(self) -> anyhow::Result<Config> {
+    fn check(self) -> Result<Config, UsageError> {
         let refresh = self.refresh.unwrap_or(120.0);
-        ensure!(
-            (1.0..=1000.0).contains(&refresh),
-            "--refresh: expected 1 to 1000 Hz, found {refresh}"
-        );
+        ensure((1.0..=1000.0).contains(&refresh), || {
+            format!("--refresh: expected 1 to 1000 Hz, found {refresh}")
+        })?;
         if let Some(ppd) = self.ppd {
-            ensure!(
-                (1.0..=1000.0).contains(&ppd),
-                "--ppd: expected 1 to 1000 pixels per degree, found {ppd}"
-            );
+            ensure((1.0..=1000.0).contains(&ppd), || {
+                format!("--ppd: expected 1 to 1000 pixels per degree, found {ppd}")
+            })?;
         }
         let max_clients = self.max_clients.unwrap_or(16);
-        ensure!(
-            (1..=256).contains(&max_clients),
-            "--max-clients: expected 1 to 256, found {max_clients}"
-        );
+        ensure((1..=256).contains(&max_clients), || {
+            format!("--max-clients: expected 1 to 256, found {max_clients}")
+        })?;
         let memory_mb = self.memory_mb.unwrap_or(2048);
-        ensure!(
-            (1..=1 << 20).contains(&memory_mb),
-            "--memory-mb: expected 1 to 1048576, found {memory_mb}"
-        );
+        ensure((1..=1 << 20).contains(&memory_mb), || {
+            format!("--memory-mb: expected 1 to 1048576, found {memory_mb}")
+        })?;
+        let log = self.log.unwrap_or_else(|| "info".to_owned());
+        ensure(EnvFilter::try_new(&log).is_ok(), || {
+            format!("--log: expected a level, or a filter such as foreframed=debug, found `{log}`")
+        })?;
         let processors = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
         Ok(Config {
             socket: self.socket,
@@ -224,24 +260,24 @@ impl Args {
             record: self.record,
             threads: self.threads.unwrap_or(processors),
             pixels_per_degree: self.ppd,
-            log: self.log.unwrap_or_else(|| "info".to_owned()),
+            log,
             max_clients,
             memory_per_client: memory_mb << 20,
+            stop_within: STOP_WITHIN,
         })
     }
 }
 
-fn read_file(path: &Path) -> anyhow::Result<Args> {
-    let text = fs::read_to_string(path)
-        .with_context(|| format!("reading the configuration {}", path.display()))?;
-    match toml::from_str(&text) {
-        Ok(args) => Ok(args),
-        Err(error) => {
-            let start = error.span().map_or(0, |span| span.start.min(text.len()));
-            let line = text.as_bytes()[..start].iter().filter(|&&byte| byte == b'\n').count() + 1;
-            bail!("{}, line {line}: {}", path.display(), error.message().replace('\n', ", "))
-        }
-    }
+fn read_file(path: &Path) -> Result<Args, UsageError> {
+    let name = path.display();
+    let text = fs::read_to_string(path).map_err(|error| {
+        UsageError(format!("--config: expected a file that can be read, found {name}: {error}"))
+    })?;
+    toml::from_str(&text).map_err(|error| {
+        let start = error.span().map_or(0, |span| span.start.min(text.len()));
+        let line = text.as_bytes()[..start].iter().filter(|&&byte| byte == b'\n').count() + 1;
+        UsageError(format!("{name}, line {line}: {}", error.message().replace('\n', ", ")))
+    })
 }
 
 #[cfg(test)]
@@ -262,7 +298,7 @@ mod tests {
         Command::parse_from(std::iter::once("foreframed").chain(line.split_whitespace())).args
     }
 
-    fn with_file(line: &str, toml: &str) -> anyhow::Result<Config> {
+    fn with_file(line: &str, toml: &str) -> Result<Config, UsageError> {
         let mut file = tempfile::NamedTempFile::new().unwrap();
         file.write_all(toml.as_bytes()).unwrap();
         Args { config: Some(file.path().to_owned()), ..flags(line) }.resolve()
@@ -328,6 +364,9 @@ mod tests {
             ("--ppd 0", "found 0"),
             ("--max-clients 0", "found 0"),
             ("--memory-mb 0", "found 0"),
+            ("--memory-mb 99999999", "found 99999999"),
+            ("--log loud=very", "found `loud=very`"),
+            ("--config none.toml", "found none.toml"),
         ] {
             let error = flags(line).resolve().unwrap_err().to_string();
             assert!(error.contains("expected") && error.contains(found), "{line}: {error}");

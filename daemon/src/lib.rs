@@ -18,11 +18,11 @@ pub mod sink;
 pub mod stream;
 
 use std::io::IsTerminal as _;
+use std::process::ExitCode;
 
-use anyhow::Context as _;
 use tracing_subscriber::EnvFilter;
 
-pub use config::{Args, Config};
+pub use config::{Args, Config, UsageError};
 pub use server::{Daemon, Stopper};
 
 /// Runs the daemon until a signal ends it: the entry point of `foreframed` and `foreframe serve`.
@@ -31,7 +31,7 @@ pub use server::{Daemon, Stopper};
 /// In one line, what was expected and what was found, if the daemon cannot start.
 pub fn run(args: Args) -> anyhow::Result<()> {
     let config = args.resolve()?;
-    start_log(&config.log)?;
+    start_log(&config.log);
     let signals = server::stop_signals()?;
     let mut daemon = Daemon::bind(config)?;
     daemon.stop_on(signals)?;
@@ -39,13 +39,18 @@ pub fn run(args: Args) -> anyhow::Result<()> {
 }
 
 /// Logs go to standard error: standard output may be a y4m stream.
-fn start_log(filter: &str) -> anyhow::Result<()> {
-    let filter = EnvFilter::try_new(filter)
-        .with_context(|| format!("--log: expected a level or a filter, found `{filter}`"))?;
+fn start_log(filter: &str) {
     tracing_subscriber::fmt()
-        .with_env_filter(filter)
+        .with_env_filter(EnvFilter::new(filter))
         .with_writer(std::io::stderr)
         .with_ansi(std::io::stderr().is_terminal())
         .init();
-    Ok(())
+}
+
+/// What a program that ends with `error` exits with: 2 for wrong usage, as for anything else on the
+/// command line that cannot be, 1 for all that is no fault of the command line.
+#[must_use]
+pub fn exit_code(error: &anyhow::Error) -> ExitCode {
+    let is_usage = error.chain().any(|cause| cause.is::<UsageError>());
+    ExitCode::from(if is_usage { 2 } else { 1 })
 }

@@ -17,7 +17,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("foreframed: {error:#}");
-            ExitCode::FAILURE
+            foreframed::exit_code(&error)
         }
     }
 }

@@ -1,5 +1,5 @@
-//! The real program: a signal ends it in good order. Here because only this package's tests know
-//! where the program is.
+//! The real program: a signal ends it in good order, and wrong usage has an exit code of its own.
+//! Here because only this package's tests know where the program is.
 
 use std::process::Command;
 
@@ -29,4 +29,32 @@ fn a_signal_ends_the_daemon_with_success_and_removes_its_socket() {
         assert!(status.success(), "{signal:?}: {status}");
         assert!(!socket.exists(), "{signal:?}: the socket is removed");
     }
+}
+
+#[test]
+fn wrong_usage_exits_with_2_and_a_place_that_cannot_be_used_with_1() {
+    let run = |arguments: &str| {
+        let output = Command::new(env!("CARGO_BIN_EXE_foreframed"))
+            .args(arguments.split_whitespace())
+            .env("XDG_RUNTIME_DIR", "relative/folder")
+            .output()
+            .unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    for (arguments, expected) in [
+        ("--refresh 0", "--refresh: expected 1 to 1000 Hz, found 0"),
+        ("--refresh -60", "--refresh: expected 1 to 1000 Hz, found -60"),
+        ("--threads 0", "--threads"),
+        ("--memory-mb -1", "--memory-mb"),
+        ("--log a=b=c", "--log: expected a level"),
+        ("--config no-such-file.toml", "--config: expected a file that can be read"),
+    ] {
+        let (code, errors) = run(arguments);
+        assert_eq!(code, Some(2), "{arguments}: {errors}");
+        assert!(errors.contains(expected), "{arguments}: {errors}");
+    }
+    let (code, errors) = run("");
+    assert_eq!(code, Some(1), "{errors}");
+    let expected = "XDG_RUNTIME_DIR: expected an absolute path, found `relative/folder`";
+    assert!(errors.contains(expected), "{errors}");
 }

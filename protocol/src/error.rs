@@ -94,8 +94,14 @@ pub enum Error {
         found: String,
     },
     /// The folder for sockets is not known.
-    #[error("XDG_RUNTIME_DIR is not set: set it, or name a socket with --socket PATH")]
-    NoRuntimeFolder,
+    #[error(
+        "XDG_RUNTIME_DIR: expected an absolute path, found {found}: set it, or name a socket with \
+         --socket PATH"
+    )]
+    RuntimeFolder {
+        /// What the variable holds.
+        found: String,
+    },
     /// A daemon already listens here.
     #[error("{}: another daemon listens here: stop it, or use another --socket PATH", path.display())]
     DaemonRuns {

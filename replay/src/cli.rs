@@ -6,6 +6,7 @@ use crate::commands::{
     completions, demo, export, import, info, man, pacing, replay, scenes, score, serve,
 };
 use crate::output::Output;
+use foreframed::UsageError;
 
 /// Makes a 40-60 Hz application look like 120 Hz and more.
 ///
@@ -49,16 +50,33 @@ pub enum Command {
     Man(man::Args),
 }
 
+impl Command {
+    /// The name of a command that prints something else than a result, or nothing.
+    fn without_result(&self) -> Option<&'static str> {
+        match self {
+            Self::Serve(_) => Some("serve"),
+            Self::Completions(_) => Some("completions"),
+            _ => None,
+        }
+    }
+}
+
 impl Cli {
     /// Runs the command.
     ///
     /// # Errors
     /// What was expected, what was found, and what to do, as a chain of contexts.
     pub fn run(self) -> anyhow::Result<()> {
+        if let (true, Some(name)) = (self.json, self.command.without_result()) {
+            let text = format!(
+                "--json: expected a command that ends with a result, found `{name}`: leave it out"
+            );
+            return Err(UsageError(text).into());
+        }
         let output = Output::new(self.json);
         match self.command {
             Command::Demo(args) => demo::run(&args, &output),
-            Command::Serve(args) => serve::run(args, &output),
+            Command::Serve(args) => serve::run(args),
             Command::Scenes(args) => scenes::run(&args, &output),
             Command::Import(args) => import::run(&args, &output),
             Command::Export(args) => export::run(&args, &output),

@@ -9,6 +9,7 @@ pub mod commands;
 pub mod demo;
 pub mod draw;
 pub mod exr_frames;
+pub mod options;
 pub mod output;
 pub mod pictures;
 pub mod recording;

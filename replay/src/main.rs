@@ -10,7 +10,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("foreframe: {error:#}");
-            ExitCode::FAILURE
+            foreframed::exit_code(&error)
         }
     }
 }

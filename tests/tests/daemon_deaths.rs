@@ -99,6 +99,22 @@ fn a_daemon_that_stops_finishes_its_recording() {
 }
 
 #[test]
+fn a_sink_that_cannot_be_written_is_told_in_one_line_before_the_first_stream() {
+    let folder = private_folder();
+    let socket = folder.path().join("daemon.sock");
+    let sink = format!("y4m:{}", folder.path().join("none/out.y4m").display());
+    let args = foreframed::Args {
+        socket: Some(socket.clone()),
+        sink: Some(sink.parse().unwrap()),
+        ..Default::default()
+    };
+    let error = foreframed::Daemon::bind(args.resolve().unwrap()).expect_err("no such folder");
+    let error = format!("{error:#}");
+    assert!(error.contains(&format!("--sink {sink}: expected ")), "{error}");
+    assert!(!socket.exists(), "{error}");
+}
+
+#[test]
 fn a_second_daemon_is_told_in_one_line() {
     let folder = private_folder();
     let socket = folder.path().join("daemon.sock");

@@ -137,3 +137,50 @@ fn a_daemon_that_stops_ends_streams_and_says_goodbye() {
     assert!(said.iter().any(|it| matches!(it, DaemonMessage::StreamEnded(_))), "{said:?}");
     assert!(!daemon.socket.exists(), "the socket is removed");
 }
+
+#[test]
+fn a_pipe_without_a_reader_holds_up_neither_streams_nor_clients_nor_the_end() {
+    let pipes = daemon_fixture::private_folder();
+    let pipe = pipes.path().join("pipe");
+    let mode = rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR;
+    rustix::fs::mkfifoat(rustix::fs::CWD, &pipe, mode).unwrap();
+    let args = foreframed::Args { record: Some("a.mcap".into()), ..Default::default() };
+    let sink = format!("y4m:{}", pipe.display());
+    let mut daemon = RunningDaemon::start_config(&sink, args, |config| {
+        config.stop_within = std::time::Duration::from_millis(50);
+    });
+    let mut clients = [daemon.connect(), daemon.connect()];
+    for client in &mut clients {
+        let mut source = client.open_stream(1, 8, 8);
+        for color in [RED, GREEN] {
+            let submit = client.submit(&mut source, color);
+            client.expect_presented(&submit);
+        }
+    }
+    daemon.stop();
+    let capture = foreframed::capture::Capture::open(&daemon.path("a.mcap")).unwrap();
+    let info = capture.info().unwrap();
+    assert!(!info.is_truncated(), "the recording is finished");
+    assert_eq!(info.frames as u64 + info.gaps, 4);
+}
+
+#[test]
+fn a_subscription_that_is_taken_back_at_once_leaves_no_pool_and_can_be_made_again() {
+    let daemon = RunningDaemon::start("shm");
+    let mut client = daemon.connect();
+    let mut source = client.open_stream(1, 8, 8);
+    for _ in 0..20 {
+        client.send(foreframe_protocol::Subscribe { stream: 1, slots: 2 });
+        client.send(foreframe_protocol::Unsubscribe { stream: 1 });
+        client.expect("the end of the subscription", |message| {
+            matches!(message, DaemonMessage::OutputEnded(_)).then_some(())
+        });
+    }
+    // Pools that were allocated before their subscription was taken back came with a message.
+    client.take_waiting();
+    let screen = client.subscribe(1, 2);
+    assert_eq!(screen.pool.pool, 21, "each subscription has a number of its own");
+    client.submit(&mut source, RED);
+    let frame = client.expect_frame(&screen);
+    assert_eq!(screen.pixels(&frame), RED.repeat(64));
+}

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 #[non_exhaustive]
 pub enum CaptureError {
     /// The file could not be opened or created.
-    #[error("cannot open {path}: {source}", path = path.display())]
+    #[error("cannot open {path}", path = path.display())]
     Open {
         /// Which file.
         path: PathBuf,
@@ -15,7 +15,7 @@ pub enum CaptureError {
         source: std::io::Error,
     },
     /// Reading or writing the file failed.
-    #[error("{doing}: {source}")]
+    #[error("{doing}")]
     Io {
         /// What was being done.
         doing: &'static str,
@@ -23,7 +23,7 @@ pub enum CaptureError {
         source: std::io::Error,
     },
     /// The container layer refused to write.
-    #[error("writing the MCAP container: {0}")]
+    #[error("writing the MCAP container")]
     Container(#[from] mcap::McapError),
     /// The file is no MCAP file at all.
     #[error("expected an MCAP file (it starts with {expected:02x?}), found {found:02x?}")]

@@ -7,6 +7,9 @@ use serde::{Deserialize, Serialize};
 
 use super::schema;
 
+/// Name of the setting that a replay needs to see what was seen: pixels per degree of visual angle.
+pub const PIXELS_PER_DEGREE: &str = "pixels_per_degree";
+
 /// Where the frames of a capture come from.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]

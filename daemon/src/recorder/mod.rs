@@ -1,20 +1,26 @@
 //! Records what applications send, on a thread of its own, behind a bounded queue.
 //!
 //! Guarantees that no stream ever waits for the disk: with the queue full a key is not recorded,
-//! and the file says so in a gap record in front of the next key that is. Every key is in the file
-//! when the writer turns to the next one, so a daemon that is killed leaves a capture that opens up
-//! to its last whole key.
+//! and the file says so in a gap record. Every key is in the file when the writer turns to the next
+//! one, so a daemon that is killed leaves a capture that opens up to its last whole key. The end of
+//! the daemon waits for the file to be finished, and no longer than it was told to.
 
-use std::io;
+use std::fs::File;
+use std::io::{self, BufWriter};
 use std::path::Path;
-use std::sync::Arc;
-use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
-use std::thread::{self, JoinHandle};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{
+    Receiver, RecvTimeoutError, Sender, SyncSender, TrySendError, channel, sync_channel,
+};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+use std::time::Duration;
 
 use anyhow::Context as _;
 use foreframe_engine::MonoTime;
 use foreframe_protocol::{CreateStream, PlaneKind, StreamFormat, Submit};
-use tracing::{error, warn};
+use rustix::fs::{Mode, OFlags, fcntl_getfl, fcntl_setfl, open};
+use tracing::warn;
 
 use crate::capture::{
     CaptureError, CaptureWriter, Gap, PlaneBytes, PlaneInfo, SessionInfo, pixel_layout,
@@ -28,76 +34,121 @@ const QUEUED_KEYS: usize = 8;
 #[expect(clippy::large_enum_variant, reason = "nearly all are keys, and few wait")]
 enum Job {
     Stream(CreateStream),
-    Key { gap: Option<Gap>, arrived_at: MonoTime, submit: Submit, planes: Arc<KeyPlanes> },
+    Key {
+        gap: Option<Gap>,
+        arrived_at: MonoTime,
+        submit: Submit,
+        planes: Arc<KeyPlanes>,
+    },
     Gap(Gap),
+    /// Wakes the thread, which then sees that the recording is over.
+    End,
 }
 
 /// The recording of one daemon.
 #[derive(Debug)]
 pub struct Recorder {
-    jobs: Option<SyncSender<Job>>,
-    thread: Option<JoinHandle<()>>,
+    jobs: SyncSender<Job>,
+    shared: Arc<Shared>,
+    /// Holds nothing; it is disconnected when the thread has ended.
+    ended: Receiver<()>,
+    /// How long the end of the recording waits for the disk.
+    patience: Duration,
+}
+
+/// What the thread looks at after each job.
+#[derive(Default)]
+struct Shared {
+    is_over: AtomicBool,
+    /// What streams that have ended could not put into the full queue.
+    last_words: Mutex<Vec<Job>>,
 }
 
 /// One stream's end of the recording.
 #[derive(Debug)]
 pub struct StreamRecorder {
     jobs: SyncSender<Job>,
+    shared: Arc<Shared>,
     /// Number of the stream in the file, where several sessions may use the same one.
     number: u32,
+    /// There until it is in the queue.
+    unannounced: Option<CreateStream>,
     gap: Option<Gap>,
 }
 
+impl std::fmt::Debug for Shared {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Shared").field("is_over", &self.is_over).finish_non_exhaustive()
+    }
+}
+
 impl Recorder {
-    /// Creates or replaces the file, and starts the thread.
+    /// Creates or replaces the file, and starts the thread. When this is dropped, it waits up to
+    /// `patience` for everything to be in the file.
     ///
     /// # Errors
-    /// If the file cannot be written or the thread not started.
-    pub fn start(path: &Path, session: &SessionInfo) -> anyhow::Result<Self> {
-        let writer = CaptureWriter::create(path, session)
-            .with_context(|| format!("starting the recording {}", path.display()))?;
-        Self::start_writer(writer).context("starting the recorder's thread")
+    /// If the file cannot be written, is a pipe without a reader, or the thread cannot be started.
+    pub fn start(path: &Path, session: &SessionInfo, patience: Duration) -> anyhow::Result<Self> {
+        let file = create(path)
+            .map_err(|source| CaptureError::Open { path: path.to_owned(), source })
+            .and_then(|file| CaptureWriter::to_writer(BufWriter::new(file), session));
+        let writer = file.with_context(|| format!("starting the recording {}", path.display()))?;
+        Self::start_writer(writer, patience).context("starting the recorder's thread")
     }
 
-    fn start_writer<W: io::Write + Send + 'static>(writer: CaptureWriter<W>) -> io::Result<Self> {
+    fn start_writer<W: io::Write + Send + 'static>(
+        writer: CaptureWriter<W>,
+        patience: Duration,
+    ) -> io::Result<Self> {
         let (jobs, queue) = sync_channel(QUEUED_KEYS);
-        let thread = thread::Builder::new()
-            .name("foreframe-record".to_owned())
-            .spawn(move || record_all(writer, &queue))?;
-        Ok(Self { jobs: Some(jobs), thread: Some(thread) })
+        let (alive, ended) = channel();
+        let shared = Arc::new(Shared::default());
+        let seen = Arc::clone(&shared);
+        thread::Builder::new().name("foreframe-record".to_owned()).spawn(move || {
+            let _until_the_end: Sender<()> = alive;
+            if let Err(error) = record_all(writer, &queue, &seen) {
+                // Later jobs go nowhere: senders count them as missing, and say nothing more.
+                warn!(error = format!("{:#}", anyhow::Error::from(error)), "the recording stops");
+            }
+        })?;
+        Ok(Self { jobs, shared, ended, patience })
     }
 
-    /// The end of a stream that is called `number` in the file, where no other one is. None once
-    /// the recording is over.
+    /// The end of a stream that is called `number` in the file, where no other one is.
     #[must_use]
-    pub fn stream(&self, number: u32) -> Option<StreamRecorder> {
-        Some(StreamRecorder { jobs: self.jobs.clone()?, number, gap: None })
+    pub fn stream(&self, number: u32) -> StreamRecorder {
+        let (jobs, shared) = (self.jobs.clone(), Arc::clone(&self.shared));
+        StreamRecorder { jobs, shared, number, unannounced: None, gap: None }
     }
 }
 
 impl Drop for Recorder {
-    /// Waits until everything is in the file and closes it. The streams have ended before.
+    /// Waits until everything is in the file and closes it, but not for ever: the disk, or the
+    /// reader of a pipe, may be stuck. What is in the file by then can be read.
     fn drop(&mut self) {
-        self.jobs = None;
-        if let Some(thread) = self.thread.take()
-            && thread.join().is_err()
-        {
-            error!("the recorder's thread panicked");
+        self.shared.is_over.store(true, Ordering::Release);
+        // With the queue full the thread is awake and looks after each job.
+        let _full = self.jobs.try_send(Job::End);
+        if let Err(RecvTimeoutError::Timeout) = self.ended.recv_timeout(self.patience) {
+            let waited_s = self.patience.as_secs_f64();
+            warn!(waited_s, "the recording is stuck; what waits to be written is lost");
         }
     }
 }
 
 impl StreamRecorder {
-    /// Announces the stream, before its first key. Waits for the queue, so it is done by the
-    /// stream's own thread, before the stream runs.
-    pub fn announce(&self, create: &CreateStream) {
-        let create = CreateStream { stream: self.number, ..*create };
-        // A recording that has failed has said so.
-        drop(self.jobs.send(Job::Stream(create)));
+    /// Announces the stream, before its first key. Never waits: with the queue full it is announced
+    /// with a later key, and the keys until then count as missing.
+    pub fn announce(&mut self, create: &CreateStream) {
+        self.unannounced = Some(CreateStream { stream: self.number, ..*create });
+        self.try_announce();
     }
 
     /// Hands a key over, or counts it as missing if the disk is behind. Never waits.
     pub fn offer(&mut self, submit: &Submit, arrived_at: MonoTime, planes: &Arc<KeyPlanes>) {
+        if !self.try_announce() {
+            return self.count_missing(arrived_at);
+        }
         let submit = Submit { stream: self.number, ..*submit };
         let planes = Arc::clone(planes);
         let job = Job::Key { gap: self.gap.take(), arrived_at, submit, planes };
@@ -106,9 +157,23 @@ impl StreamRecorder {
         else {
             return;
         };
+        self.gap = if let Job::Key { gap, .. } = job { gap } else { None };
+        self.count_missing(arrived_at);
+    }
+
+    /// True once the stream is announced.
+    fn try_announce(&mut self) -> bool {
+        let Some(create) = self.unannounced else { return true };
+        let is_announced = self.jobs.try_send(Job::Stream(create)).is_ok();
+        if is_announced {
+            self.unannounced = None;
+        }
+        is_announced
+    }
+
+    fn count_missing(&mut self, arrived_at: MonoTime) {
         let at_ns = arrived_at.as_ns();
-        let before = if let Job::Key { gap, .. } = job { gap } else { None };
-        let mut gap = before.unwrap_or_else(|| Gap {
+        let gap = self.gap.get_or_insert_with(|| Gap {
             stream: self.number,
             count: 0,
             from_ns: at_ns,
@@ -117,31 +182,68 @@ impl StreamRecorder {
         });
         gap.count += 1;
         gap.to_ns = at_ns;
-        self.gap = Some(gap);
     }
 }
 
 impl Drop for StreamRecorder {
-    /// Records a gap at the end of the stream. Waits for the queue: no frame is made any more.
+    /// Records a gap at the end of the stream.
     fn drop(&mut self) {
-        if let Some(gap) = self.gap.take() {
-            drop(self.jobs.send(Job::Gap(gap)));
-        }
+        let Some(gap) = self.gap.take() else { return };
+        let announcement = self.unannounced.take().map(Job::Stream);
+        let mut last_words = self.shared.lock();
+        last_words.extend(announcement.into_iter().chain([Job::Gap(gap)]));
+        drop(last_words);
+        // With the queue full the thread is awake and looks after each job.
+        let _full = self.jobs.try_send(Job::End);
     }
 }
 
-fn record_all<W: io::Write>(mut writer: CaptureWriter<W>, queue: &Receiver<Job>) {
+impl Shared {
+    fn lock(&self) -> std::sync::MutexGuard<'_, Vec<Job>> {
+        self.last_words.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Creates or replaces a file. Where it is a pipe, somebody must be reading it already: to wait for
+/// a reader would keep the daemon from starting and from stopping.
+fn create(path: &Path) -> io::Result<File> {
+    let flags = OFlags::WRONLY | OFlags::CREATE | OFlags::TRUNC | OFlags::CLOEXEC;
+    let file = match open(path, flags | OFlags::NONBLOCK, Mode::from_raw_mode(0o666)) {
+        Err(rustix::io::Errno::NXIO) => {
+            let text =
+                "expected a file, or a pipe that somebody reads, found a pipe without reader";
+            return Err(io::Error::other(text));
+        }
+        opened => opened?,
+    };
+    fcntl_setfl(&file, fcntl_getfl(&file)? - OFlags::NONBLOCK)?;
+    Ok(File::from(file))
+}
+
+fn record_all<W: io::Write>(
+    mut writer: CaptureWriter<W>,
+    queue: &Receiver<Job>,
+    shared: &Shared,
+) -> Result<(), CaptureError> {
     let mut formats = Vec::new();
     for job in queue {
-        if let Err(error) = record(&mut writer, &mut formats, job) {
-            warn!(%error, "the recording stops here");
-            // Later jobs go nowhere: senders count them as missing, and say nothing more.
-            return;
+        record(&mut writer, &mut formats, job)?;
+        let is_over = shared.is_over.load(Ordering::Acquire);
+        if is_over {
+            // The streams have ended, or hang and are not waited for.
+            queue.try_iter().try_for_each(|job| record(&mut writer, &mut formats, job))?;
+        }
+        let last_words = std::mem::take(&mut *shared.lock());
+        last_words.into_iter().try_for_each(|job| record(&mut writer, &mut formats, job))?;
+        if is_over {
+            break;
         }
     }
     if let Err(error) = writer.finish() {
-        warn!(%error, "the recording has no summary; it can be read all the same");
+        let error = format!("{:#}", anyhow::Error::from(error));
+        warn!(error, "the recording has no summary; it can be read all the same");
     }
+    Ok(())
 }
 
 fn record<W: io::Write>(
@@ -155,6 +257,7 @@ fn record<W: io::Write>(
             writer.add_stream(&create)
         }
         Job::Gap(gap) => writer.gap(&gap),
+        Job::End => Ok(()),
         Job::Key { gap, arrived_at, submit, planes } => {
             if let Some(gap) = gap {
                 writer.gap(&gap)?;
@@ -183,3 +286,6 @@ fn plane(format: &StreamFormat, submit: &Submit, kind: PlaneKind) -> Option<Plan
         motion_from_ns: submit.motion_from_ns.filter(|_| kind == PlaneKind::Motion),
     })
 }
+
+#[cfg(test)]
+mod tests;

@@ -17,7 +17,7 @@ use crate::clock;
 use crate::session::fault::Fault;
 use crate::session::flood::MESSAGES_PER_SECOND;
 use crate::session::outbox::Unsendable;
-use crate::session::{Session, Stage};
+use crate::session::{Session, Stage, Subscription};
 
 /// Messages of one client that are read in a row; then the others have their turn.
 const MESSAGES_PER_TURN: usize = 32;
@@ -224,8 +224,8 @@ impl Server {
         if session.stage == Stage::Open {
             info!(session = id, "session ended");
         }
-        let followed = session.subscriptions.iter().filter_map(|it| it.outlet.as_ref());
-        let followed: Vec<u64> = followed.map(|(ordinal, _)| *ordinal).collect();
+        let followed: Vec<u64> =
+            session.subscriptions.iter().filter_map(Subscription::followed).collect();
         for ordinal in followed {
             self.refresh_outlets(ordinal);
         }

@@ -1,8 +1,10 @@
 //! The main loop: one thread that listens, speaks with every client, and owns every stream.
 //!
-//! Nothing here blocks: sockets are non-blocking, pixels are copied and made on the streams'
-//! threads, memory is unmapped on the reaper's. Whatever a client does wrong ends that client's
-//! session ([`Server::fail`]) and nothing else.
+//! Nothing here waits for a peer, a disk or pixels: sockets are non-blocking, pixels are copied and
+//! made on the streams' threads, sinks are opened on threads of their own, memory of subscribers is
+//! allocated and all memory unmapped elsewhere. What does take time here is small and bounded: to
+//! start a stream's threads, and to map the pool that a client hands over. Whatever a client does
+//! wrong ends that client's session ([`Server::fail`]) and nothing else.
 //!
 //! - [`connections`]: accept, handshake, read, end
 //! - [`requests`]: what each message of a client leads to
@@ -16,7 +18,6 @@ mod subscriptions;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use anyhow::Context as _;
 use calloop::generic::Generic;
@@ -29,20 +30,20 @@ use foreframe_protocol::socket::{Listener, default_socket_path};
 use foreframe_protocol::{EndReason, Features, Goodbye};
 use tracing::{info, warn};
 
-use crate::capture::{CaptureSource, SessionInfo};
+use crate::capture::{CaptureSource, PIXELS_PER_DEGREE, SessionInfo};
 use crate::clock;
 use crate::config::{Config, SinkSpec};
 use crate::recorder::Recorder;
 use crate::session::Session;
 use crate::session::handshake::Terms;
+use crate::sink;
 use crate::stream::FromStream;
+use crate::stream::allocator::Allocator;
 use crate::stream::reaper::Reaper;
 use streams::Stream;
 
 /// Streams of one client at once.
 const MAX_STREAMS: u32 = 4;
-/// Time that streams have to end when the daemon stops: a slow sink writes what it has taken.
-const STOP_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// A daemon that listens.
 #[derive(Debug)]
@@ -81,6 +82,7 @@ struct Server {
     /// An instant of the refresh grid, which all streams share.
     display_origin: MonoTime,
     reaper: Reaper,
+    allocator: Allocator,
     recorder: Option<Recorder>,
 }
 
@@ -88,21 +90,26 @@ impl Daemon {
     /// Takes the socket and starts the recording.
     ///
     /// # Errors
-    /// If another daemon holds the socket, its folder may not be used, or a file cannot be made.
+    /// If the sink's place cannot be written, another daemon holds the socket, its folder may not
+    /// be used, or a file cannot be made.
     pub fn bind(config: Config) -> anyhow::Result<Self> {
+        sink::prepare(&config.sink)?;
         let path = match &config.socket {
             Some(path) => path.clone(),
             None => default_socket_path()?,
         };
         let listener = Listener::bind(&path)?;
         let recorder = match &config.record {
-            Some(file) => Some(Recorder::start(file, &session_info(&config))?),
+            Some(file) => Some(Recorder::start(file, &session_info(&config), config.stop_within)?),
             None => None,
         };
         let event_loop = EventLoop::try_new().context("making the main loop")?;
         let handle = event_loop.handle();
         let (events, from_streams) = calloop::channel::channel();
         let reaper = Reaper::spawn().context("starting the thread that unmaps memory")?;
+        let (pools, from_allocator) = calloop::channel::channel();
+        let allocator =
+            Allocator::spawn(pools).context("starting the thread that allocates memory")?;
         let features = match config.sink {
             SinkSpec::Null => Features::NONE,
             _ => Features::OUTPUT,
@@ -126,6 +133,7 @@ impl Daemon {
             events,
             display_origin: clock::now(),
             reaper,
+            allocator,
             recorder,
         };
 
@@ -140,6 +148,11 @@ impl Daemon {
         insert(&handle, from_streams, |event, (), server: &mut Server| {
             if let calloop::channel::Event::Msg(event) = event {
                 server.on_stream_event(event);
+            }
+        })?;
+        insert(&handle, from_allocator, |event, (), server: &mut Server| {
+            if let calloop::channel::Event::Msg(allocated) = event {
+                server.on_allocated(allocated);
             }
         })?;
         let (stop, stopped) = make_ping().context("making the stop signal")?;
@@ -194,7 +207,8 @@ impl Server {
         for stream in self.streams.values_mut() {
             stream.close(EndReason::Stopping);
         }
-        let timer = Timer::from_duration(STOP_TIMEOUT);
+        // Their sinks have as long to write what they have taken; this is for threads that hang.
+        let timer = Timer::from_duration(2 * self.config.stop_within);
         let armed = insert(&self.handle, timer, |_, (), server: &mut Server| {
             warn!(streams = server.streams.len(), "stopping without waiting for the last streams");
             server.finish_stop();
@@ -243,7 +257,12 @@ where
 
 fn session_info(config: &Config) -> SessionInfo {
     let name = config.record.as_deref().map(stem).unwrap_or_default();
-    SessionInfo::new(name, CaptureSource::Live)
+    let session = SessionInfo::new(name, CaptureSource::Live);
+    let session = match config.pixels_per_degree {
+        Some(ppd) => session.with_config(PIXELS_PER_DEGREE, ppd),
+        None => session,
+    };
+    session
         .with_config("method", config.method)
         .with_config("refresh_interval_ns", config.refresh_interval.as_ns())
         .with_config("sink", &config.sink)

@@ -81,10 +81,13 @@ impl Server {
         let ordinal = self.next_ordinal;
         let config = &self.config;
         let format = ingest::stream_format(&create.format);
-        let sink = Sink::open(&config.sink, &format, config.refresh_interval, ordinal)
-            .with_context(|| format!("opening the sink {}", config.sink))?;
-        let sink = match sink.keeps_frames() {
-            true => Some(SinkWorker::spawn(sink).context("starting the sink's thread")?),
+        let sink = match config.sink.keeps_frames() {
+            true => {
+                let (spec, interval) = (config.sink.clone(), config.refresh_interval);
+                let open = move || Sink::open(&spec, &format, interval, ordinal);
+                let worker = SinkWorker::spawn(open, config.stop_within);
+                Some(worker.context("starting the sink's thread")?)
+            }
             false => None,
         };
         let waker = Waker::new().context("making a waker")?;
@@ -107,7 +110,7 @@ impl Server {
             mailbox: Arc::clone(&mailbox),
             events: self.events.clone(),
             sink,
-            recorder: self.recorder.as_ref().and_then(|it| it.stream(number_in_file)),
+            recorder: self.recorder.as_ref().map(|it| it.stream(number_in_file)),
         })
         .context("starting the stream's thread")?;
         self.next_ordinal += 1;

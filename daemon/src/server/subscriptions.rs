@@ -3,17 +3,17 @@
 //! A client follows a stream of its own, or whatever the daemon shows: the stream that started last
 //! and has not ended. When that changes, the subscriber gets a pool of the new size.
 
-use std::os::fd::OwnedFd;
 use std::sync::Arc;
 
-use foreframe_protocol::{EndReason, Error, ErrorCode, OutputEnded, OutputPool, Subscribe};
+use foreframe_protocol::{EndReason, ErrorCode, OutputEnded, Subscribe};
 
 use super::Server;
 use super::requests::quota_fault;
-use crate::session::Subscription;
 use crate::session::fault::Fault;
+use crate::session::{AwaitedPool, Subscription};
+use crate::stream::allocator::{AllocatedPool, PoolRequest, Wish};
 use crate::stream::mailbox::Outlets;
-use crate::stream::outlet::{self, Outlet};
+use crate::stream::outlet;
 
 impl Server {
     pub(super) fn subscribe(&mut self, id: u32, subscribe: Subscribe) -> Result<(), Fault> {
@@ -35,7 +35,8 @@ impl Server {
             let fault = Fault::fatal(ErrorCode::State, "subscribe", expected, "another");
             return Err(fault.of_stream(number));
         }
-        let subscription = Subscription { stream: number, slots, outlet: None, cost: 0 };
+        let subscription =
+            Subscription { stream: number, slots, outlet: None, awaited: None, cost: 0 };
         session.subscriptions.push(subscription);
         self.follow(id, number, ordinal);
         Ok(())
@@ -64,8 +65,7 @@ impl Server {
         for id in followers {
             let Some(session) = self.sessions.get_mut(&id) else { continue };
             let Some(subscription) = session.subscription(0) else { continue };
-            let followed = subscription.outlet.as_ref().map(|(ordinal, _)| *ordinal);
-            if followed != shown {
+            if subscription.followed() != shown {
                 self.follow(id, 0, shown);
             }
         }
@@ -84,33 +84,22 @@ impl Server {
             _ => EndReason::SourceEnded,
         };
         let Some(owner) = self.sessions.get_mut(&session) else { return };
-        let follows =
-            |it: &Subscription| matches!(&it.outlet, Some((followed, _)) if *followed == ordinal);
-        if owner.subscription(number).is_some_and(|it| follows(it)) {
+        let subscription = owner.subscription(number);
+        if subscription.is_some_and(|it| it.followed() == Some(ordinal)) {
             self.end_subscription(session, number, reason);
         }
     }
 
-    /// Gives a subscription a pool for this stream, or none.
+    /// Gives a subscription a pool for this stream, or none. The pool comes when it is allocated.
     fn follow(&mut self, id: u32, number: u32, ordinal: Option<u64>) {
         let before = self.detach(id, number);
         if let Some(before) = before {
             self.refresh_outlets(before);
         }
         let Some(ordinal) = ordinal else { return };
-        match self.attach(id, number, ordinal) {
-            Ok(Some((message, fd))) => {
-                if let Some(session) = self.sessions.get_mut(&id) {
-                    let sent = session.send_with_fd(message, fd);
-                    self.after_send(id, sent);
-                }
-                self.refresh_outlets(ordinal);
-            }
-            Ok(None) => {}
-            Err(fault) => {
-                self.fail(id, fault.tolerated().of_stream(number));
-                self.end_subscription(id, number, EndReason::Error);
-            }
+        if let Err(fault) = self.request_pool(id, number, ordinal) {
+            self.fail(id, fault.tolerated().of_stream(number));
+            self.end_subscription(id, number, EndReason::Error);
         }
     }
 
@@ -118,42 +107,63 @@ impl Server {
     fn detach(&mut self, id: u32, number: u32) -> Option<u64> {
         let session = self.sessions.get_mut(&id)?;
         let subscription = session.subscription(number)?;
+        let followed = subscription.followed();
         let cost = std::mem::take(&mut subscription.cost);
-        let (ordinal, _) = subscription.outlet.take()?;
+        subscription.outlet = None;
+        subscription.awaited = None;
         session.cost = session.cost.saturating_sub(cost);
-        Some(ordinal)
+        followed
     }
 
-    fn attach(
-        &mut self,
-        id: u32,
-        number: u32,
-        ordinal: u64,
-    ) -> Result<Option<(OutputPool, OwnedFd)>, Fault> {
+    fn request_pool(&mut self, id: u32, number: u32, ordinal: u64) -> Result<(), Fault> {
         let memory_per_client = self.config.memory_per_client;
-        let reaper = self.reaper.clone();
         let Some(format) = self.streams.get(&ordinal).map(|stream| stream.create.format) else {
-            return Ok(None);
+            return Ok(());
         };
         let session = self.open_session(id)?;
         let used = session.cost;
         let pool = session.last_output_pool + 1;
-        let Some(subscription) = session.subscription(number) else { return Ok(None) };
-        let cost = outlet::pool_bytes(&format, subscription.slots);
+        let Some(subscription) = session.subscription(number) else { return Ok(()) };
+        let slots = subscription.slots;
+        let cost = outlet::pool_bytes(&format, slots);
         if used.saturating_add(cost) > memory_per_client {
             return Err(quota_fault("subscribe", memory_per_client, used, cost));
         }
-        let (outlet, memory, message) =
-            Outlet::allocate(id, number, pool, subscription.slots, &format)?;
-        let fd = memory
-            .fd()
-            .try_clone_to_owned()
-            .map_err(|source| Error::Os { action: "copy a descriptor", source })?;
-        subscription.outlet = Some((ordinal, Arc::new(reaper.guard(outlet))));
+        let wish = Wish::default();
+        let wanted = Arc::downgrade(&wish);
+        subscription.awaited = Some(AwaitedPool { ordinal, pool, wish });
         subscription.cost = cost;
         session.last_output_pool = pool;
         session.cost += cost;
-        Ok(Some((message, fd)))
+        let stream = number;
+        let request = PoolRequest { session: id, stream, pool, slots, format, wish: wanted };
+        self.allocator.request(request);
+        Ok(())
+    }
+
+    /// Puts a pool into use, unless its subscription has changed its mind meanwhile.
+    pub(super) fn on_allocated(&mut self, allocated: AllocatedPool) {
+        let AllocatedPool { session: id, stream: number, pool, made } = allocated;
+        let reaper = self.reaper.clone();
+        // What is not wanted any more is unmapped elsewhere, too.
+        let made = made.map(|(outlet, message, fd)| (reaper.guard(outlet), message, fd));
+        let Some(session) = self.sessions.get_mut(&id) else { return };
+        let Some(subscription) = session.subscription(number) else { return };
+        let Some(awaited) = subscription.awaited.take_if(|awaited| awaited.pool == pool) else {
+            return;
+        };
+        match made {
+            Ok((outlet, message, fd)) => {
+                subscription.outlet = Some((awaited.ordinal, Arc::new(outlet)));
+                let sent = session.send_with_fd(message, fd);
+                self.after_send(id, sent);
+                self.refresh_outlets(awaited.ordinal);
+            }
+            Err(error) => {
+                self.fail(id, Fault::from(error).tolerated().of_stream(number));
+                self.end_subscription(id, number, EndReason::Error);
+            }
+        }
     }
 
     fn end_subscription(&mut self, id: u32, number: u32, reason: EndReason) {

@@ -18,6 +18,7 @@ use foreframe_engine::MonoTime;
 use foreframe_protocol::DaemonMessage;
 use foreframe_protocol::socket::Channel;
 
+use crate::stream::allocator::Wish;
 use crate::stream::outlet::Outlet;
 use crate::stream::reaper::Reaped;
 use flood::FloodGate;
@@ -41,8 +42,30 @@ pub struct Subscription {
     pub slots: u32,
     /// The stream that it follows at present, by its number in this process, and its pool.
     pub outlet: Option<(u64, Arc<Reaped<Outlet>>)>,
-    /// Bytes of that pool.
+    /// The stream that it will follow, as soon as its pool is allocated.
+    pub awaited: Option<AwaitedPool>,
+    /// Bytes of the one pool or the other.
     pub cost: u64,
+}
+
+impl Subscription {
+    /// The stream that it follows or will follow.
+    #[must_use]
+    pub fn followed(&self) -> Option<u64> {
+        let awaited = self.awaited.as_ref().map(|awaited| awaited.ordinal);
+        self.outlet.as_ref().map(|(ordinal, _)| *ordinal).or(awaited)
+    }
+}
+
+/// A pool that is being allocated.
+#[derive(Debug)]
+pub struct AwaitedPool {
+    /// The stream that it is for, by its number in this process.
+    pub ordinal: u64,
+    /// Its number in the session.
+    pub pool: u32,
+    /// Says that it is wanted as long as this lives.
+    pub wish: Wish,
 }
 
 /// A connected client.

@@ -11,7 +11,7 @@ pub mod worker;
 pub mod y4m;
 
 use std::ffi::OsString;
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
@@ -67,12 +67,6 @@ impl Sink {
         Y4mSink::create(out, format, interval).map(Self::Y4m)
     }
 
-    /// Whether frames reach anything, so that a copy of them is worth its price.
-    #[must_use]
-    pub fn keeps_frames(&self) -> bool {
-        !matches!(self, Self::Null)
-    }
-
     /// Takes output frame number `index`.
     ///
     /// # Errors
@@ -85,16 +79,51 @@ impl Sink {
         }
     }
 
-    /// Takes a refresh that showed the last frame again. Only a constant-rate file has to know.
+    /// Takes `refreshes` in a row that showed the last frame again. Only a constant-rate file has
+    /// to know.
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn repeat(&mut self) -> io::Result<()> {
+    pub fn repeat(&mut self, refreshes: u64) -> io::Result<()> {
         match self {
             Self::Null | Self::Png(_) => Ok(()),
-            Self::Y4m(sink) => sink.repeat(),
+            Self::Y4m(sink) => sink.repeat(refreshes),
         }
     }
+}
+
+/// Looks whether the place that `spec` names can take frames, and makes its folder. Opens nothing:
+/// to open a pipe waits for its reader.
+///
+/// # Errors
+/// What was expected and what was found.
+pub fn prepare(spec: &SinkSpec) -> io::Result<()> {
+    match spec {
+        SinkSpec::Null | SinkSpec::Shm | SinkSpec::Y4mStdout => Ok(()),
+        SinkSpec::Png(dir) => {
+            let made = fs::create_dir_all(dir).and_then(|()| is_writable(dir));
+            made.map_err(|error| wrong(spec, "a folder for pictures", &error))
+        }
+        SinkSpec::Y4m(path) => {
+            let looked = match fs::metadata(path) {
+                Ok(found) if found.is_dir() => Err(io::ErrorKind::IsADirectory.into()),
+                Ok(_) => is_writable(path),
+                Err(_) => match path.parent() {
+                    Some(dir) if !dir.as_os_str().is_empty() => is_writable(dir),
+                    _ => is_writable(Path::new(".")),
+                },
+            };
+            looked.map_err(|error| wrong(spec, "a file or pipe that can be written", &error))
+        }
+    }
+}
+
+fn is_writable(path: &Path) -> io::Result<()> {
+    rustix::fs::access(path, rustix::fs::Access::WRITE_OK).map_err(io::Error::from)
+}
+
+fn wrong(spec: &SinkSpec, expected: &str, found: &io::Error) -> io::Error {
+    io::Error::other(format!("--sink {spec}: expected {expected}, found: {found}"))
 }
 
 /// The place for stream number `ordinal` beside `path`: `out.y4m`, `out-1.y4m`, `out-2.y4m`.
@@ -125,6 +154,34 @@ mod tests {
             ("a.b/c.d.mcap", 3, "a.b/c.d-3.mcap"),
         ] {
             assert_eq!(beside(Path::new(path), ordinal), Path::new(expected));
+        }
+    }
+
+    #[test]
+    fn a_place_that_cannot_take_frames_is_told_beforehand() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("file");
+        fs::write(&file, "").unwrap();
+        let [dir, file] = [dir.path(), &file].map(|path| path.display().to_string());
+        for spec in [
+            format!("png:{file}"),
+            format!("png:{file}/frames"),
+            format!("y4m:{dir}"),
+            format!("y4m:{dir}/none/out.y4m"),
+        ] {
+            let error = prepare(&spec.parse().unwrap()).expect_err(&spec).to_string();
+            assert!(error.contains(&format!("--sink {spec}: expected ")), "{error}");
+            assert_eq!(error.lines().count(), 1, "{error}");
+        }
+        for spec in [
+            "null".to_owned(),
+            "shm".to_owned(),
+            "-".to_owned(),
+            format!("y4m:{file}"),
+            format!("y4m:{dir}/new.y4m"),
+            format!("png:{dir}/a/b"),
+        ] {
+            prepare(&spec.parse().unwrap()).expect(&spec);
         }
     }
 

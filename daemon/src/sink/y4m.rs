@@ -11,6 +11,10 @@
 //!
 //! The coefficients are 219/255 and 224/255 times those of the standard, rounded so that (1) sums
 //! to 219/255 and (2) and (3) to 0: white is 235, and grey has no colour.
+//!
+//! A refresh that showed nothing new is a frame as well, or the file would play too fast. Of a
+//! longer rest one second is written: a stream that stood still for an hour does not cost the disk
+//! an hour of frames at once when it goes on.
 
 use std::io::{self, Write};
 
@@ -30,6 +34,8 @@ pub struct Y4mSink<W> {
     rgb: Vec<u8>,
     /// The last frame as it was written: what a repeated refresh shows again.
     encoded: Vec<u8>,
+    /// Refreshes of one second.
+    most_repeats: u64,
 }
 
 impl<W: Write> Y4mSink<W> {
@@ -45,7 +51,8 @@ impl<W: Write> Y4mSink<W> {
             "YUV4MPEG2 W{width} H{height} F{frames}:{seconds} Ip A1:1 C444 XCOLORRANGE=LIMITED"
         )?;
         let converter = SrgbConverter::new(format);
-        Ok(Self { out, converter, rgb: Vec::new(), encoded: Vec::new() })
+        let most_repeats = frames.unsigned_abs().div_ceil(seconds.unsigned_abs());
+        Ok(Self { out, converter, rgb: Vec::new(), encoded: Vec::new(), most_repeats })
     }
 
     /// Writes one frame.
@@ -59,18 +66,22 @@ impl<W: Write> Y4mSink<W> {
             let pixels = self.rgb.chunks_exact(3);
             self.encoded.extend(pixels.map(|rgb| component(matrix_row, [rgb[0], rgb[1], rgb[2]])));
         }
-        self.repeat()
+        self.write_encoded()
     }
 
-    /// Writes the last frame again, for a refresh that showed nothing new. Nothing before the
-    /// first.
+    /// Writes the last frame again, for refreshes in a row that showed nothing new: as often as
+    /// that, or for one second if that is less. Nothing before the first frame.
     ///
     /// # Errors
     /// As [`Self::write`].
-    pub fn repeat(&mut self) -> io::Result<()> {
+    pub fn repeat(&mut self, refreshes: u64) -> io::Result<()> {
         if self.encoded.is_empty() {
             return Ok(());
         }
+        (0..refreshes.min(self.most_repeats)).try_for_each(|_| self.write_encoded())
+    }
+
+    fn write_encoded(&mut self) -> io::Result<()> {
         self.out.write_all(b"FRAME\n")?;
         self.out.write_all(&self.encoded)?;
         self.out.flush()
@@ -152,10 +163,10 @@ mod tests {
         let mut bytes = Vec::new();
         let format = StreamFormat::rgba8(3, 1);
         let mut sink = Y4mSink::create(&mut bytes, &format, MonoSpan::from_hz(120.0)).unwrap();
-        sink.repeat().unwrap();
+        sink.repeat(1).unwrap();
         let texels = vec![Rgba8(0xff00_00ff), Rgba8(0xffff_ffff), Rgba8(0)];
         sink.write(&ColorPlane::Rgba8(Plane::from_vec(3, 1, texels))).unwrap();
-        sink.repeat().unwrap();
+        sink.repeat(1).unwrap();
         let header = b"YUV4MPEG2 W3 H1 F120:1 Ip A1:1 C444 XCOLORRANGE=LIMITED\n";
         let frame = b"FRAME\n\x3f\xeb\x10\x66\x80\x80\xf0\x80\x80";
         assert_eq!(bytes, [&header[..], frame, frame].concat());

@@ -29,8 +29,17 @@ pub enum FrameOutcome {
     Presented(PresentedFrame),
     /// The display shows the picture before again: there is nothing new to show.
     Repeated,
-    /// The picture was not ready for its refresh.
-    Dropped,
+    /// The picture was not ready for its refresh, which shows the one before again.
+    Dropped(DroppedFrame),
+}
+
+/// A picture that was made in vain.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct DroppedFrame {
+    /// Real, or made.
+    pub kind: FrameKind,
+    /// Time that the engine took.
+    pub work: MonoSpan,
 }
 
 /// A picture that goes to the display.
@@ -53,7 +62,7 @@ pub struct PresentedFrame {
     pub present_at: MonoTime,
     /// Refresh that it is shown at.
     pub presented_at: MonoTime,
-    /// Refreshes since the picture before that showed that one again.
+    /// Refreshes since the picture before, all of which showed that one again: repeated or dropped.
     pub repeats_before: u64,
     /// Time that the engine took.
     pub work: MonoSpan,
@@ -68,8 +77,8 @@ pub enum FrameKind {
     Synthesised,
 }
 
-/// Output frames since the stream began, each refresh in exactly one of real, synthesised and
-/// repeated.
+/// What became of the refreshes from the first planned picture on. Each is in exactly one of real,
+/// synthesised, repeated and dropped.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct FrameCounts {
     /// Keys taken in.
@@ -78,9 +87,10 @@ pub struct FrameCounts {
     pub real: u64,
     /// Refreshes that showed a made picture.
     pub synthesised: u64,
-    /// Refreshes that showed the picture before again.
+    /// Refreshes that showed the picture before again because there was nothing new to show, or
+    /// nobody had time to plan them.
     pub repeated: u64,
-    /// Pictures that were not ready in time.
+    /// Refreshes that showed the picture before again because theirs was not ready in time.
     pub dropped: u64,
 }
 
@@ -95,12 +105,15 @@ pub struct StreamCore {
     counts: FrameCounts,
     newest_key: Option<NewestKey>,
     shown: Option<Shown>,
+    /// The last refresh that is counted.
+    counted_until: Option<MonoTime>,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct NewestKey {
     index: u64,
     content_time: MonoTime,
+    /// Of the key before. None at the first key and at a cut: the engine has none before it then.
     previous_content_time: Option<MonoTime>,
     /// Whether pictures made from it differ from it.
     moves: bool,
@@ -137,6 +150,7 @@ impl StreamCore {
             counts: FrameCounts::default(),
             newest_key: None,
             shown: None,
+            counted_until: None,
         }
     }
 
@@ -155,7 +169,10 @@ impl StreamCore {
         self.newest_key = Some(NewestKey {
             index: input.index,
             content_time: input.content_time,
-            previous_content_time: self.newest_key.map(|before| before.content_time),
+            previous_content_time: self
+                .newest_key
+                .filter(|_| !input.is_cut)
+                .map(|before| before.content_time),
             moves: match self.method {
                 Method::Hold => false,
                 Method::Blend => true,
@@ -183,35 +200,33 @@ impl StreamCore {
             .is_some_and(|shown| (shown.content_time, shown.keys) == (content_time, key.taken));
         if is_shown_already {
             self.pacer.on_presented(plan.present_at, plan.present_at);
+            self.count_until(plan.present_at);
             return Some(FrameOutcome::Repeated);
         }
         let started_at = clock();
         let report = self.engine.synthesise(content_time, &mut self.frame)?;
         let ready_at = clock();
         self.pacer.on_work(ready_at - plan.wake_at.min(started_at));
+        let kind = self.kind(content_time, report.phase, &key);
         let presented_at = self.display.refresh_at_or_after(ready_at);
+        self.count_until(plan.present_at - self.display.interval());
+        self.counted_until = Some(plan.present_at);
         if presented_at > plan.present_at {
             self.pacer.on_dropped();
             self.counts.dropped += 1;
-            return Some(FrameOutcome::Dropped);
+            return Some(FrameOutcome::Dropped(DroppedFrame { kind, work: report.work }));
         }
         // Ready early: the display still shows it at the refresh that it was planned for.
         let presented_at = plan.present_at;
         self.pacer.on_presented(plan.present_at, presented_at);
-        let is_of_a_key =
-            content_time == key.content_time || Some(content_time) == key.previous_content_time;
-        let kind = if is_of_a_key {
-            self.counts.real += 1;
-            FrameKind::Real
-        } else {
-            self.counts.synthesised += 1;
-            FrameKind::Synthesised
-        };
+        match kind {
+            FrameKind::Real => self.counts.real += 1,
+            FrameKind::Synthesised => self.counts.synthesised += 1,
+        }
         let (index, repeats_before) = self.shown.map_or((0, 0), |shown| {
             let refreshes = self.refreshes(presented_at - shown.presented_at);
             (shown.index + refreshes, refreshes - 1)
         });
-        self.counts.repeated += repeats_before;
         self.shown = Some(Shown { index, presented_at, content_time, keys: key.taken });
         Some(FrameOutcome::Presented(PresentedFrame {
             index,
@@ -227,12 +242,21 @@ impl StreamCore {
         }))
     }
 
-    /// The newest picture that was made.
+    /// The stream ends at `now`: what the display has shown until then is counted.
+    pub fn finish(&mut self, now: MonoTime) {
+        // The refresh at or after a time is the last one at or before it, or one too late.
+        let next = self.display.refresh_at_or_after(now);
+        let last = if next > now { next - self.display.interval() } else { next };
+        self.count_until(last);
+    }
+
+    /// The picture that was made last: presented, or dropped. Whoever needs the presented one later
+    /// takes it before the next is made, and may leave any other in its place.
     pub fn frame(&mut self) -> &mut ColorPlane {
         &mut self.frame
     }
 
-    /// What became of the refreshes so far. Repeats are counted when they are over.
+    /// What became of the refreshes so far, up to the last plan or [`finish`](Self::finish).
     #[must_use]
     pub fn counts(&self) -> FrameCounts {
         self.counts
@@ -250,6 +274,29 @@ impl StreamCore {
         if key.moves { planned } else { key.content_time }
     }
 
+    /// Counts the refreshes after the last counted one, up to the one at `last`, as repeated.
+    fn count_until(&mut self, last: MonoTime) {
+        let Some(counted) = self.counted_until else { return };
+        if last - counted > self.display.interval().scale(1, 2) {
+            self.counts.repeated += self.refreshes(last - counted);
+            self.counted_until = Some(last);
+        }
+    }
+
+    /// Where the picture of `content_time` came from: the engine copies a key at phase 0, and
+    /// `blend` one of its two keys except between them.
+    fn kind(&self, content_time: MonoTime, phase: Phase, key: &NewestKey) -> FrameKind {
+        let is_of_a_key = match self.method {
+            Method::Hold => true,
+            Method::Blend => {
+                content_time >= key.content_time
+                    || key.previous_content_time.is_none_or(|older| content_time <= older)
+            }
+            _ => phase == Phase::ZERO,
+        };
+        if is_of_a_key { FrameKind::Real } else { FrameKind::Synthesised }
+    }
+
     /// How many refreshes a span covers, at least one.
     fn refreshes(&self, span: MonoSpan) -> u64 {
         let interval = self.display.interval().as_ns();
@@ -257,3 +304,6 @@ impl StreamCore {
         rounded.max(1).unsigned_abs()
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -164,7 +164,7 @@ impl Mailbox {
         self.lock().outlets = outlets;
     }
 
-    /// No state is left half-written by a panic: every change is one assignment.
+    /// Nothing that panics is called under the lock, so a poisoned one holds whole state.
     fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -66,7 +66,7 @@ impl PlaneCopier {
         };
         let planes = Arc::get_mut(&mut copy).expect("nobody else holds this copy");
         planes.copy(format, submit, pool, slot_offset)?;
-        // A burst that the recorder has worked off leaves no more than one copy behind.
+        // Copies that the recorder has worked off after a burst go now, with the next key.
         self.copies.retain(|copy| !is_unread(copy));
         self.copies.push(Arc::clone(&copy));
         Ok(copy)

@@ -21,7 +21,7 @@ use thread_priority::{
 };
 use tracing::{debug, error, info, trace, warn};
 
-use super::core::{CoreConfig, FrameKind, FrameOutcome, PresentedFrame, StreamCore};
+use super::core::{CoreConfig, DroppedFrame, FrameKind, FrameOutcome, PresentedFrame, StreamCore};
 use super::mailbox::{Mailbox, Submission, Taken};
 use super::planes::PlaneCopier;
 use super::{FromStream, StreamEvent};
@@ -133,7 +133,7 @@ impl StreamThread {
     }
 
     fn run(mut self, alarm: &Alarm) {
-        if let Some(recorder) = &self.parts.recorder {
+        if let Some(recorder) = &mut self.parts.recorder {
             recorder.announce(&self.parts.create);
         }
         ask_for_real_time();
@@ -165,6 +165,7 @@ impl StreamThread {
                 }
             }
         }
+        self.core.finish(clock::now());
         self.send_statistics();
     }
 
@@ -226,7 +227,10 @@ impl StreamThread {
         let Some(outcome) = self.core.make(plan, clock::now) else { return };
         match outcome {
             FrameOutcome::Repeated => self.repeats_in_a_row += 1,
-            FrameOutcome::Dropped => debug!(present_at = ?plan.present_at, "frame not ready"),
+            FrameOutcome::Dropped(DroppedFrame { kind, work }) => {
+                debug!(present_at = ?plan.present_at, "frame not ready");
+                self.add_work(kind, work);
+            }
             FrameOutcome::Presented(frame) => {
                 trace!(?frame, "frame presented");
                 self.repeats_in_a_row = 0;
@@ -239,10 +243,14 @@ impl StreamThread {
         }
     }
 
-    fn deliver(&mut self, frame: &PresentedFrame) {
-        if frame.kind == FrameKind::Synthesised {
-            self.synthesis.add(frame.work);
+    fn add_work(&mut self, kind: FrameKind, work: MonoSpan) {
+        if kind == FrameKind::Synthesised {
+            self.synthesis.add(work);
         }
+    }
+
+    fn deliver(&mut self, frame: &PresentedFrame) {
+        self.add_work(frame.kind, frame.work);
         let phase_q12 = frame.phase.q12().unsigned_abs();
         for outlet in self.parts.mailbox.outlets().iter() {
             let Some((slot, skipped)) = outlet.write(self.core.frame()) else { continue };

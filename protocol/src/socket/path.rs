@@ -15,7 +15,7 @@ const FOREIGN_ACCESS: u32 = 0o077;
 /// `$XDG_RUNTIME_DIR/foreframe/daemon.sock`.
 ///
 /// # Errors
-/// [`Error::NoRuntimeFolder`] if the variable is not set.
+/// [`Error::RuntimeFolder`] if the variable is not set or not an absolute path.
 pub fn default_socket_path() -> Result<PathBuf> {
     socket_path_in(std::env::var_os("XDG_RUNTIME_DIR"))
 }
@@ -23,13 +23,14 @@ pub fn default_socket_path() -> Result<PathBuf> {
 /// The socket's path below this runtime folder, which must be absolute.
 ///
 /// # Errors
-/// [`Error::NoRuntimeFolder`] if it is missing, empty or relative.
+/// [`Error::RuntimeFolder`] if it is missing, empty or relative.
 pub fn socket_path_in(runtime_folder: Option<OsString>) -> Result<PathBuf> {
-    runtime_folder
-        .map(PathBuf::from)
-        .filter(|folder| folder.is_absolute())
-        .map(|folder| folder.join(FOLDER_NAME).join(SOCKET_NAME))
-        .ok_or(Error::NoRuntimeFolder)
+    let folder = runtime_folder.map(PathBuf::from);
+    match folder {
+        Some(folder) if folder.is_absolute() => Ok(folder.join(FOLDER_NAME).join(SOCKET_NAME)),
+        Some(folder) => Err(Error::RuntimeFolder { found: format!("`{}`", folder.display()) }),
+        None => Err(Error::RuntimeFolder { found: "nothing".to_owned() }),
+    }
 }
 
 /// Makes the folder of the socket if it is missing, and checks that it is a real folder of this

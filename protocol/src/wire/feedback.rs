@@ -101,17 +101,18 @@ pub struct Statistics {
     pub keys_superseded: u64,
     /// Of these, with planes that do not fit the stream.
     pub keys_refused: u64,
-    /// Pictures on the display: real + synthesised + repeated.
+    /// Refreshes that showed what they should: real + synthesised + repeated. From the first planned
+    /// picture on, each refresh is in exactly one of these three or in `dropped`.
     pub presented: u64,
     /// Of these, key frames as they came.
     pub real: u64,
     /// Of these, in-between frames.
     pub synthesised: u64,
-    /// Of these, shown before.
+    /// Of these, the picture before again: there was nothing new to show.
     pub repeated: u64,
-    /// In-between frames that were not ready at their refresh.
+    /// Refreshes that showed the picture before again because theirs was not ready.
     pub dropped: u64,
-    /// Mean time to make one in-between frame.
+    /// Mean time to make one in-between frame, dropped ones included.
     pub synthesis_mean_ns: u64,
 }
 

@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
-use anyhow::ensure;
 use foreframe_engine::Method;
 use foreframe_fixtures::{SceneInfo, Size};
 use foreframed::config::SinkSpec;
 
 use crate::demo::{self, Settings};
+use crate::options::{number, parse_scene};
 use crate::output::Output;
 
 /// Arguments of `foreframe demo`.
@@ -17,25 +17,28 @@ Leaves contact-sheet.png (key, in-between, truth, error), timeline.png (when key
 shown) and summary.json in the folder. Needs about 2 GB of memory at 1280x720 for 3 seconds.")]
 pub struct Args {
     /// Scene to show; `foreframe scenes` lists them
-    #[arg(long, value_name = "NAME", default_value = "atrium")]
-    pub scene: String,
+    #[arg(long, value_name = "NAME", default_value = "atrium", value_parser = parse_scene)]
+    pub scene: &'static SceneInfo,
     /// Length of the show in seconds, 0.5 to 10
-    #[arg(long, value_name = "S", default_value_t = 3.0)]
+    #[arg(long, value_name = "S", default_value_t = 3.0, value_parser = number(0.5, 10.0))]
+    #[arg(allow_negative_numbers = true)]
     pub seconds: f64,
     /// Columns and rows of a frame
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size)]
     pub size: Size,
     /// Keys per second, 10 to 240
-    #[arg(long, value_name = "HZ", default_value_t = 40.0)]
+    #[arg(long, value_name = "HZ", default_value_t = 40.0, value_parser = number(10.0, 240.0))]
+    #[arg(allow_negative_numbers = true)]
     pub key_rate: f64,
     /// Refreshes per second, 10 to 480
-    #[arg(long, value_name = "HZ", default_value_t = 120.0)]
+    #[arg(long, value_name = "HZ", default_value_t = 120.0, value_parser = number(10.0, 480.0))]
+    #[arg(allow_negative_numbers = true)]
     pub refresh: f64,
     /// How in-between frames are made
     #[arg(long, value_name = "NAME", default_value_t = Method::Linear)]
     pub method: Method,
     /// Where the daemon sends frames besides: shm (the demo alone), png:DIR or y4m:PATH
-    #[arg(long, default_value_t = SinkSpec::Shm)]
+    #[arg(long, default_value_t = SinkSpec::Shm, value_parser = parse_sink)]
     pub sink: SinkSpec,
     /// Folder for the pictures and the numbers
     #[arg(long, value_name = "DIR", default_value = "foreframe-demo")]
@@ -45,18 +48,10 @@ pub struct Args {
 /// Runs the command.
 ///
 /// # Errors
-/// If an option is out of range, the daemon does not start, or a file cannot be written.
+/// If the daemon does not start, or a file cannot be written.
 pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
-    in_range("--seconds", args.seconds, 0.5, 10.0)?;
-    in_range("--key-rate", args.key_rate, 10.0, 240.0)?;
-    in_range("--refresh", args.refresh, 10.0, 480.0)?;
-    ensure!(
-        !matches!(args.sink, SinkSpec::Null | SinkSpec::Y4mStdout),
-        "--sink: expected shm, png:DIR or y4m:PATH, found `{}`; the demo has to see the frames",
-        args.sink
-    );
     let settings = Settings {
-        scene: SceneInfo::by_name(&args.scene)?,
+        scene: args.scene,
         size: args.size,
         seconds: args.seconds,
         key_rate_hz: args.key_rate,
@@ -69,9 +64,14 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
     output.result(&summary, &summary.text())
 }
 
-fn in_range(option: &str, value: f64, least: f64, most: f64) -> anyhow::Result<()> {
-    ensure!((least..=most).contains(&value), "{option}: expected {least} to {most}, found {value}");
-    Ok(())
+/// The demo has to see the frames, and prints its results on standard output.
+fn parse_sink(spec: &str) -> Result<SinkSpec, String> {
+    match spec.parse()? {
+        SinkSpec::Null | SinkSpec::Y4mStdout => {
+            Err(format!("expected shm, png:DIR or y4m:PATH, found `{spec}`"))
+        }
+        sink => Ok(sink),
+    }
 }
 
 fn parse_size(text: &str) -> Result<Size, String> {

@@ -3,7 +3,6 @@
 //! Reads what to simulate, runs it twice on the same chance (our pacer, and a plain timer to
 //! compare with), and reports.
 
-use anyhow::ensure;
 use foreframe_engine::MonoSpan;
 use foreframe_engine::pacing::sim::{
     DisplayScript, KeyScript, Policy, Scenario, SimReport, WorkScript, simulate,
@@ -11,6 +10,7 @@ use foreframe_engine::pacing::sim::{
 use foreframe_engine::pacing::{PacerConfig, WorkEstimate};
 use serde::Serialize;
 
+use crate::options::{number, whole};
 use crate::output::Output;
 
 /// Jitter of synthesis times around `--work-ms`, +-: what a loaded two-core machine shows.
@@ -21,38 +21,48 @@ const TIMESTAMP_JITTER: MonoSpan = MonoSpan::from_us(50);
 /// Arguments of `foreframe pacing`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// Refresh rate of the display.
+    /// Refresh rate of the display, 1 to 1000.
     #[arg(long, value_name = "HZ", default_value_t = 120.0)]
+    #[arg(value_parser = number(1.0, 1000.0), allow_negative_numbers = true)]
     refresh: f64,
-    /// Key frames per second.
+    /// Key frames per second, 1 to 1000.
     #[arg(long, value_name = "HZ", default_value_t = 40.0)]
+    #[arg(value_parser = number(1.0, 1000.0), allow_negative_numbers = true)]
     key_rate: f64,
-    /// Arrivals of keys are off by up to this, plus or minus.
+    /// Arrivals of keys are off by up to this, plus or minus, 0 to 1000.
     #[arg(long, value_name = "MS", default_value_t = 2.0)]
+    #[arg(value_parser = number(0.0, 1000.0), allow_negative_numbers = true)]
     jitter_ms: f64,
-    /// The same as a share of the key interval; added to `--jitter-ms`.
+    /// The same as a share of the key interval; added to `--jitter-ms`, 0 to 100.
     #[arg(long, value_name = "P", default_value_t = 0.0)]
+    #[arg(value_parser = number(0.0, 100.0), allow_negative_numbers = true)]
     arrival_jitter_percent: f64,
-    /// Content times of keys are off by up to this share of the key interval, plus or minus.
+    /// Content times of keys are off by up to this share of the key interval, plus or minus, 0 to 100.
     #[arg(long, value_name = "P", default_value_t = 0.0)]
+    #[arg(value_parser = number(0.0, 100.0), allow_negative_numbers = true)]
     content_jitter_percent: f64,
-    /// Keys that arrive a whole key interval late, in percent.
+    /// Keys that arrive a whole key interval late, in percent, 0 to 100.
     #[arg(long, value_name = "P", default_value_t = 0.0)]
+    #[arg(value_parser = number(0.0, 100.0), allow_negative_numbers = true)]
     late_percent: f64,
-    /// How long to simulate.
+    /// How long to simulate, 0.1 to 86400.
     #[arg(long, value_name = "S", default_value_t = 60.0)]
+    #[arg(value_parser = number(0.1, 86400.0), allow_negative_numbers = true)]
     seconds: f64,
-    /// By how much the display's period is longer than it says, in millionths.
-    #[arg(long, value_name = "PPM", default_value_t = 50, allow_negative_numbers = true)]
+    /// By how much the display's period is longer than it says, in millionths, -1000 to 1000.
+    #[arg(long, value_name = "PPM", default_value_t = 50)]
+    #[arg(value_parser = whole(-1000, 1000), allow_negative_numbers = true)]
     drift_ppm: i32,
-    /// Refreshes that the display skips, in percent.
+    /// Refreshes that the display skips, in percent, 0 to 90.
     #[arg(long, value_name = "P", default_value_t = 0.0)]
+    #[arg(value_parser = number(0.0, 90.0), allow_negative_numbers = true)]
     skipped_percent: f64,
-    /// Time that making a picture takes, usually.
+    /// Time that making a picture takes, usually, 0 to 1000.
     #[arg(long, value_name = "MS", default_value_t = 2.0)]
+    #[arg(value_parser = number(0.0, 1000.0), allow_negative_numbers = true)]
     work_ms: f64,
-    /// Where chance comes from.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    /// Where chance comes from, a whole number of 0 or more.
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true)]
     seed: u64,
 }
 
@@ -96,9 +106,9 @@ struct Percentiles {
 /// Runs the command.
 ///
 /// # Errors
-/// If an argument is out of range, or standard output cannot be written.
+/// If standard output cannot be written.
 pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
-    let scenario = scenario(args)?;
+    let scenario = scenario(args);
     let config = PacerConfig {
         refresh_interval: scenario.display.refresh_interval,
         known_refresh: None,
@@ -121,51 +131,39 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
     output.result(&report, &text(args, &report))
 }
 
-fn scenario(args: &Args) -> anyhow::Result<Scenario> {
-    let refresh_interval = interval("--refresh", args.refresh)?;
-    let key_interval = interval("--key-rate", args.key_rate)?;
-    let seconds = within("--seconds", args.seconds, 0.1, 86_400.0)?;
-    let jitter = MonoSpan::from_secs_f64(within("--jitter-ms", args.jitter_ms, 0.0, 1e3)? / 1e3);
-    let arrival = per_mille("--arrival-jitter-percent", args.arrival_jitter_percent)?;
-    let content = per_mille("--content-jitter-percent", args.content_jitter_percent)?;
-    let work = MonoSpan::from_secs_f64(within("--work-ms", args.work_ms, 0.0, 1e3)? / 1e3);
-    Ok(Scenario {
-        duration: MonoSpan::from_secs_f64(seconds),
+fn scenario(args: &Args) -> Scenario {
+    let key_interval = MonoSpan::from_hz(args.key_rate);
+    let share = |percent| key_interval.scale(per_mille(percent).into(), 1_000);
+    let work = MonoSpan::from_secs_f64(args.work_ms / 1e3);
+    Scenario {
+        duration: MonoSpan::from_secs_f64(args.seconds),
         seed: args.seed,
         keys: KeyScript {
-            content_jitter: key_interval.scale(content.into(), 1_000),
-            arrival_jitter: jitter + key_interval.scale(arrival.into(), 1_000),
-            late_per_mille: per_mille("--late-percent", args.late_percent)?,
+            content_jitter: share(args.content_jitter_percent),
+            arrival_jitter: MonoSpan::from_secs_f64(args.jitter_ms / 1e3)
+                + share(args.arrival_jitter_percent),
+            late_per_mille: per_mille(args.late_percent),
             ..KeyScript::steady(key_interval)
         },
         display: DisplayScript {
-            drift_ppm: args.drift_ppm.clamp(-1_000, 1_000),
-            skipped_per_mille: per_mille("--skipped-percent", args.skipped_percent)?.min(900),
+            drift_ppm: args.drift_ppm,
+            skipped_per_mille: per_mille(args.skipped_percent),
             timestamp_jitter: TIMESTAMP_JITTER,
-            ..DisplayScript::steady(refresh_interval)
+            ..DisplayScript::steady(MonoSpan::from_hz(args.refresh))
         },
         work: WorkScript {
             typical: work,
             jitter: work.scale(WORK_JITTER_PERCENT, 100),
             spike_per_mille: 0,
         },
-    })
-}
-
-fn interval(option: &str, hz: f64) -> anyhow::Result<MonoSpan> {
-    Ok(MonoSpan::from_hz(within(option, hz, 1.0, 1_000.0)?))
+    }
 }
 
 /// Percent as parts per thousand.
-#[expect(clippy::cast_possible_truncation, reason = "between 0 and 1000")]
-#[expect(clippy::cast_sign_loss, reason = "between 0 and 1000")]
-fn per_mille(option: &str, percent: f64) -> anyhow::Result<u32> {
-    Ok((within(option, percent, 0.0, 100.0)? * 10.0).round() as u32)
-}
-
-fn within(option: &str, value: f64, low: f64, high: f64) -> anyhow::Result<f64> {
-    ensure!((low..=high).contains(&value), "{option}: expected {low} to {high}, found {value}");
-    Ok(value)
+#[expect(clippy::cast_possible_truncation, reason = "options of 0 to 100 percent")]
+#[expect(clippy::cast_sign_loss, reason = "options of 0 to 100 percent")]
+fn per_mille(percent: f64) -> u32 {
+    (percent * 10.0).round() as u32
 }
 
 impl From<&SimReport> for Row {
@@ -242,7 +240,7 @@ mod tests {
 
     use super::*;
 
-    #[derive(clap::Parser)]
+    #[derive(clap::Parser, Debug)]
     struct Line {
         #[command(flatten)]
         args: Args,
@@ -257,8 +255,7 @@ mod tests {
         let scenario = scenario(&args(
             "--refresh 100 --key-rate 50 --jitter-ms 1 --arrival-jitter-percent 10 \
              --content-jitter-percent 30 --late-percent 2.5 --seconds 3 --drift-ppm -20",
-        ))
-        .unwrap();
+        ));
         assert_eq!(scenario.display.refresh_interval, MonoSpan::from_ms(10));
         assert_eq!(scenario.keys.arrival_jitter, MonoSpan::from_ms(3));
         assert_eq!(scenario.keys.content_jitter, MonoSpan::from_ms(6));
@@ -267,17 +264,39 @@ mod tests {
     }
 
     #[test]
-    fn what_is_out_of_range_names_the_option_and_both_numbers() {
-        for line in ["--refresh 0", "--key-rate nan", "--seconds -1", "--late-percent 101"] {
-            let error = scenario(&args(&line.replace(' ', "="))).unwrap_err().to_string();
-            let option = line.split(' ').next().unwrap();
-            assert!(error.starts_with(&format!("{option}: expected ")), "{error}");
+    fn what_is_out_of_range_is_refused_and_never_quietly_made_to_fit() {
+        for line in [
+            "--refresh 0",
+            "--key-rate nan",
+            "--seconds -1",
+            "--late-percent 101",
+            "--drift-ppm 1001",
+            "--drift-ppm -1001",
+            "--skipped-percent 90.1",
+            "--seed -1",
+        ] {
+            let words = std::iter::once("pacing").chain(line.split_whitespace());
+            let error = Line::try_parse_from(words).unwrap_err();
+            let (option, value) = line.split_once(' ').unwrap();
+            let text = error.to_string();
+            assert!(text.contains(option) && text.contains(&format!("'{value}'")), "{text}");
+            assert_eq!(error.exit_code(), 2, "{text}");
+        }
+    }
+
+    #[test]
+    fn the_help_tells_every_range() {
+        use clap::CommandFactory as _;
+        let command = Line::command();
+        for argument in command.get_arguments().filter(|argument| argument.get_id() != "help") {
+            let help = argument.get_help().unwrap().to_string();
+            assert!(help.contains(" to ") || help.contains("or more"), "{argument}: {help}");
         }
     }
 
     #[test]
     fn json_has_the_fixed_names() {
-        let scenario = scenario(&args("--seconds 1")).unwrap();
+        let scenario = scenario(&args("--seconds 1"));
         let row = Row::from(&simulate(&scenario, Policy::NaiveTimer));
         let json = serde_json::to_value(&row).unwrap();
         for name in ["presents", "missed", "on_target_percent", "interval_5_95_ms"] {

@@ -4,13 +4,14 @@ use std::fmt::Write as _;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use anyhow::{Context as _, bail, ensure};
+use anyhow::{Context as _, bail};
 use foreframe_engine::{Method, MonoSpan};
 use foreframed::config::{Backend, SinkSpec};
 use foreframed::sink::Sink;
 use serde::Serialize;
 
 use super::score::all_processors;
+use crate::options::{number, parse_count};
 use crate::output::Output;
 use crate::recording::Recording as _;
 use crate::recording::capture::CaptureRecording;
@@ -33,14 +34,20 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = Backend::Auto)]
     pub backend: Backend,
     /// Refresh rate of the virtual display, 1 to 1000.
-    #[arg(long, value_name = "HZ", default_value_t = 120.0)]
+    #[arg(long, value_name = "HZ", default_value_t = 120.0, value_parser = number(1.0, 1000.0))]
+    #[arg(allow_negative_numbers = true)]
     pub refresh: f64,
     /// Threads of the engine, which do not change the result [default: as many as there are
     /// processors]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = parse_count, allow_negative_numbers = true)]
     pub threads: Option<NonZeroUsize>,
+    /// Pixels per degree of visual angle, 1 to 1000; turns on damping of motion that no eye can
+    /// follow [default: as in the capture, which is without, unless it was recorded with `--ppd`]
+    #[arg(long, value_name = "N", value_parser = number(1.0, 1000.0), allow_negative_numbers = true)]
+    pub ppd: Option<f64>,
     /// Take every N-th frame as a key, from frame 0, and leave out the others.
-    #[arg(long, value_name = "N", default_value = "1")]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = parse_count)]
+    #[arg(allow_negative_numbers = true)]
     pub ratio: NonZeroUsize,
     /// Where output frames go: null, png:DIR or y4m:PATH.
     #[arg(long, default_value = "null", value_parser = parse_sink)]
@@ -90,11 +97,6 @@ struct ReplayedFrame {
 /// # Errors
 /// If the capture cannot be read, or a frame cannot be written.
 pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
-    ensure!(
-        (1.0..=1000.0).contains(&args.refresh),
-        "--refresh: expected 1 to 1000 Hz, found {}",
-        args.refresh
-    );
     let name = args.capture.display();
     let mut recording = CaptureRecording::open(&args.capture)?;
     for warning in recording.warnings()? {
@@ -110,6 +112,11 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
         method: args.method,
         threads: args.threads.unwrap_or_else(all_processors),
         refresh_interval,
+        pixels_per_degree: match args.ppd {
+            #[expect(clippy::cast_possible_truncation, reason = "a number of 1 to 1000")]
+            Some(ppd) => Some(ppd as f32),
+            None => recording.pixels_per_degree()?,
+        },
     };
     let timing = if args.step { KeyTiming::Stepped } else { KeyTiming::AsRecorded };
     let mut sink = Sink::open(&args.sink, reader.format(), refresh_interval, 0)
@@ -120,10 +127,16 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
     let mut digester = FrameDigester::default();
     let mut frames: Vec<ReplayedFrame> = Vec::new();
     let mut first = None;
+    let mut next_index = 0;
     let losses = replay(*reader.format(), &config, keys, |frame, picture| {
+        // A refresh whose picture was dropped showed the one before again.
+        let passed = frame.index - next_index;
+        next_index = frame.index + 1;
         match frame.kind {
-            OutputKind::Repeated => sink.repeat(),
-            OutputKind::Real | OutputKind::Synthesised => sink.write(frame.index, picture),
+            OutputKind::Repeated => sink.repeat(passed + 1),
+            OutputKind::Real | OutputKind::Synthesised => {
+                sink.repeat(passed).and_then(|()| sink.write(frame.index, picture))
+            }
         }
         .with_context(|| format!("writing output frame {} to {}", frame.index, args.sink))?;
         let origin = *first.get_or_insert(frame.present_at);

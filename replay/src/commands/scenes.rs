@@ -6,7 +6,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, ensure};
+use anyhow::Context as _;
 use foreframe_fixtures::client::{stream_options, wire_camera};
 use foreframe_fixtures::sequence::motion_bytes;
 use foreframe_fixtures::{Recipe, RenderedKey, Renderer, SCENES, Sampling, SceneInfo, Size};
@@ -16,6 +16,7 @@ use foreframed::capture::{
 };
 use serde::Serialize;
 
+use crate::options::{number, parse_scene};
 use crate::output::Output;
 
 /// Steps, in frames, over which motion is written besides that from frame to frame.
@@ -27,25 +28,28 @@ const START_NS: u64 = 1_000_000_000;
 #[derive(clap::Args, Debug)]
 pub struct Args {
     /// Scene to write; without it, all scenes are listed.
-    #[arg(requires = "target")]
-    pub name: Option<String>,
+    #[arg(requires = "target", value_parser = parse_scene)]
+    pub name: Option<&'static SceneInfo>,
     /// Capture to write.
-    #[arg(short, long, value_name = "FILE.mcap", group = "target")]
+    #[arg(short, long, value_name = "FILE.mcap", group = "target", requires = "name")]
     pub output: Option<PathBuf>,
     /// Folder to write one PNG per frame to; made if it is not there.
-    #[arg(long, value_name = "DIR", group = "target")]
+    #[arg(long, value_name = "DIR", group = "target", requires = "name")]
     pub png: Option<PathBuf>,
     /// Size of the pictures.
     #[arg(long, value_name = "WxH", default_value = "640x360", value_parser = size)]
     pub size: Size,
-    /// Frames per second.
-    #[arg(long, value_name = "HZ", default_value_t = 120.0)]
+    /// Frames per second, 1 to 1000.
+    #[arg(long, value_name = "HZ", default_value_t = 120.0, value_parser = number(1.0, 1000.0))]
+    #[arg(allow_negative_numbers = true)]
     pub rate: f64,
-    /// Time from the first to the last frame.
-    #[arg(long, value_name = "S", default_value_t = 1.0)]
+    /// Time from the first to the last frame, 0 to 60.
+    #[arg(long, value_name = "S", default_value_t = 1.0, value_parser = number(0.0, 60.0))]
+    #[arg(allow_negative_numbers = true)]
     pub seconds: f64,
     /// Colour is this much larger per axis than depth and motion, 1 to 4.
-    #[arg(long, value_name = "R", default_value_t = 1.0)]
+    #[arg(long, value_name = "R", default_value_t = 1.0, value_parser = number(1.0, 4.0))]
+    #[arg(allow_negative_numbers = true)]
     pub field_ratio: f64,
 }
 
@@ -74,25 +78,9 @@ struct Written<'a> {
 /// Lists or writes.
 ///
 /// # Errors
-/// If there is no such scene, an option is out of range, or a file cannot be written.
+/// If a file cannot be written.
 pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
-    let Some(name) = &args.name else { return list(output) };
-    let info = SceneInfo::by_name(name)?;
-    ensure!(
-        args.rate.is_finite() && (1.0..=1000.0).contains(&args.rate),
-        "--rate: expected 1 to 1000 Hz, found {}",
-        args.rate
-    );
-    ensure!(
-        (0.0..=60.0).contains(&args.seconds),
-        "--seconds: expected 0 to 60, found {}",
-        args.seconds
-    );
-    ensure!(
-        (1.0..=4.0).contains(&args.field_ratio),
-        "--field-ratio: expected 1 to 4, found {}",
-        args.field_ratio
-    );
+    let Some(info) = args.name else { return list(output) };
     #[expect(clippy::cast_possible_truncation, reason = "at most 60,000 frames")]
     #[expect(clippy::cast_sign_loss, reason = "seconds and rate are positive")]
     let frames = (args.seconds * args.rate).round() as u32 + 1;
@@ -104,7 +92,7 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
     };
     let Size { width, height } = args.size;
     let written = Written { scene: info.name, path, frames, width, height };
-    output.result(&written, &format!("{frames} frames of {name} are in {}", path.display()))
+    output.result(&written, &format!("{frames} frames of {} are in {}", info.name, path.display()))
 }
 
 fn list(output: &Output) -> anyhow::Result<()> {

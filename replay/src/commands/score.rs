@@ -3,11 +3,12 @@
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use anyhow::{Context as _, ensure};
+use anyhow::Context as _;
 use foreframe_engine::Method;
 use foreframed::clock;
 use foreframed::config::Backend;
 
+use crate::options::{parse_count, parse_ratio};
 use crate::output::Output;
 use crate::recording::Recording as _;
 use crate::recording::capture::CaptureRecording;
@@ -21,27 +22,30 @@ pub struct Args {
     #[arg(required = true, value_name = "FILE.mcap")]
     pub captures: Vec<PathBuf>,
     /// Take every N-th frame as a key, from frame 0, and predict the others.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = parse_ratio, allow_negative_numbers = true)]
     pub ratio: NonZeroUsize,
     /// Methods to compare: names with commas between, or all.
-    #[arg(long, value_name = "A,B", default_value = "all")]
-    pub methods: String,
+    #[arg(long, value_name = "A,B", default_value = "all", value_parser = parse_methods)]
+    pub methods: Methods,
     /// What the engine runs on.
     #[arg(long, value_enum, default_value_t = Backend::Auto)]
     pub backend: Backend,
     /// Threads of the engine [default: as many as there are processors]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = parse_count, allow_negative_numbers = true)]
     pub threads: Option<NonZeroUsize>,
 }
+
+/// Methods, each once.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Methods(pub Vec<Method>);
 
 /// Scores each capture and prints a table, or JSON.
 ///
 /// # Errors
-/// If a capture cannot be read, or a method does not exist.
+/// If a capture cannot be read.
 pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
-    ensure!(args.ratio.get() > 1, "--ratio: expected 2 or more, found 1: nothing to predict");
     let options = ScoreOptions {
-        methods: parse_methods(&args.methods)?,
+        methods: args.methods.0.clone(),
         ratio: args.ratio,
         threads: args.threads.unwrap_or_else(all_processors),
         timer: clock::now,
@@ -76,18 +80,18 @@ pub(crate) fn all_processors() -> NonZeroUsize {
 }
 
 /// Methods by name, each once, in the order of the list; `all` for every one.
-fn parse_methods(list: &str) -> anyhow::Result<Vec<Method>> {
+fn parse_methods(list: &str) -> Result<Methods, String> {
     if list == "all" {
-        return Ok(Method::ALL.to_vec());
+        return Ok(Methods(Method::ALL.to_vec()));
     }
     let mut methods = Vec::new();
     for name in list.split(',') {
-        let method = name.trim().parse().context("--methods")?;
+        let method = name.trim().parse().map_err(|error| format!("{error}"))?;
         if !methods.contains(&method) {
             methods.push(method);
         }
     }
-    Ok(methods)
+    Ok(Methods(methods))
 }
 
 #[cfg(test)]
@@ -97,13 +101,13 @@ mod tests {
     #[test]
     fn methods_are_taken_once_each_in_the_order_given() {
         let methods = parse_methods("linear, hold,linear").unwrap();
-        assert_eq!(methods, [Method::Linear, Method::Hold]);
-        assert_eq!(parse_methods("all").unwrap(), Method::ALL);
+        assert_eq!(methods.0, [Method::Linear, Method::Hold]);
+        assert_eq!(parse_methods("all").unwrap().0, Method::ALL);
     }
 
     #[test]
     fn an_unknown_method_says_which_there_are() {
-        let error = format!("{:#}", parse_methods("hold,voxels").unwrap_err());
+        let error = parse_methods("hold,voxels").unwrap_err();
         assert!(error.contains("hold, blend") && error.contains("`voxels`"), "{error}");
     }
 }

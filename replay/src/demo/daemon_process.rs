@@ -1,4 +1,5 @@
-//! The demo's daemon: a second process on a private socket.
+//! The demo's daemon: a second process on a private socket. It ends with the demo, even if that is
+//! killed, and the demo does not wait for it for ever.
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -15,6 +16,9 @@ use super::Settings;
 const START_TIMEOUT: MonoSpan = MonoSpan::from_ms(10_000);
 /// Time between two looks for the socket.
 const POLL: MonoSpan = MonoSpan::from_ms(5);
+
+/// Time that the daemon has to end: longer than it waits for a sink that is stuck.
+const STOP_TIMEOUT: MonoSpan = MonoSpan::from_ms(15_000);
 
 /// A running daemon. Killed when dropped.
 #[derive(Debug)]
@@ -42,6 +46,7 @@ impl DaemonProcess {
             .args(["--refresh", &settings.refresh_hz.to_string()])
             .args(["--method", settings.method.name()])
             .args(["--log", "warn"])
+            .args(["--with-parent", &std::process::id().to_string()])
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .spawn()
@@ -66,15 +71,28 @@ impl DaemonProcess {
         socket_in(self.folder.path())
     }
 
-    /// Asks it to end and waits until it has.
+    /// Asks it to end and waits until it has. One that does not end in time is killed.
     ///
     /// # Errors
-    /// If it ends with anything but success.
-    pub fn stop(mut self) -> anyhow::Result<()> {
+    /// If it ends with anything but success, or does not end.
+    pub fn stop(self) -> anyhow::Result<()> {
+        self.stop_within(STOP_TIMEOUT)
+    }
+
+    fn stop_within(mut self, patience: MonoSpan) -> anyhow::Result<()> {
         let id = i32::try_from(self.child.id()).ok().and_then(Pid::from_raw);
         let pid = id.context("the daemon has no process id")?;
         kill_process(pid, Signal::TERM).context("asking the daemon to end")?;
-        let status = self.child.wait().context("waiting for the daemon")?;
+        let give_up_at = clock::now() + patience;
+        let status = loop {
+            if let Some(status) = self.child.try_wait().context("waiting for the daemon")? {
+                break status;
+            }
+            if clock::now() > give_up_at {
+                bail!("expected the daemon to end within {patience}, found that it runs: killed");
+            }
+            clock::sleep_until(clock::now() + POLL);
+        };
         if !status.success() {
             bail!("expected the daemon to end well, found {status}");
         }
@@ -93,4 +111,28 @@ impl Drop for DaemonProcess {
 /// In a folder that the daemon makes, for its owner alone.
 fn socket_in(folder: &Path) -> PathBuf {
     folder.join("private").join("daemon.sock")
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Read as _;
+
+    use super::*;
+
+    #[test]
+    fn a_daemon_that_does_not_end_is_killed_and_told() {
+        let mut child = Command::new("sh")
+            .args(["-c", "trap '' TERM; echo ready; while :; do read line || sleep 1; done"])
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut out = child.stdout.take().unwrap();
+        out.read_exact(&mut [0; 6]).unwrap();
+        let id = child.id();
+        let daemon = DaemonProcess { child, folder: tempfile::tempdir().unwrap() };
+        let error = daemon.stop_within(MonoSpan::from_ms(20)).unwrap_err().to_string();
+        assert!(error.contains("killed"), "{error}");
+        assert!(!Path::new(&format!("/proc/{id}")).exists(), "nothing is left of it");
+    }
 }

@@ -9,7 +9,7 @@ use std::path::Path;
 use anyhow::Context as _;
 use foreframe_engine::{KeyInput, MonoTime, PlaneInput, StreamFormat};
 use foreframe_protocol::{PlaneDescriptor, PlaneKind, Submit};
-use foreframed::capture::{Capture, CapturedPlane, PlaneInfo, ReadAt};
+use foreframed::capture::{Capture, CapturedPlane, PIXELS_PER_DEGREE, PlaneInfo, ReadAt};
 use foreframed::ingest;
 
 use super::{Frame, FrameHead, OwnedPlane, Recording, Wanted};
@@ -75,6 +75,22 @@ impl<S: ReadAt> CaptureRecording<S> {
     #[must_use]
     pub fn name(&self) -> &str {
         &self.capture.session().name
+    }
+
+    /// The angular size of a pixel that the daemon worked with when it recorded. None where it had
+    /// none, or the capture comes from elsewhere.
+    ///
+    /// # Errors
+    /// If it is not a number of 1 to 1000.
+    pub fn pixels_per_degree(&self) -> anyhow::Result<Option<f32>> {
+        let Some(text) = self.capture.session().config.get(PIXELS_PER_DEGREE) else {
+            return Ok(None);
+        };
+        let ppd = text.parse().ok().filter(|ppd| (1.0..=1000.0).contains(ppd));
+        let ppd = ppd.with_context(|| {
+            format!("{PIXELS_PER_DEGREE} of the session: expected 1 to 1000, found `{text}`")
+        })?;
+        Ok(Some(ppd))
     }
 
     /// What a user should know about the file before trusting a result: one line each.

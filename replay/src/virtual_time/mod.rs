@@ -26,6 +26,8 @@ pub struct ReplayConfig {
     pub threads: NonZeroUsize,
     /// Period of the display.
     pub refresh_interval: MonoSpan,
+    /// Angular size of a pixel, which turns on damping of motion that no eye can follow.
+    pub pixels_per_degree: Option<f32>,
 }
 
 /// Where an output frame comes from.
@@ -122,7 +124,7 @@ pub fn replay(
                     show(&frame, stream.core.frame())?;
                 }
             }
-            Some(FrameOutcome::Dropped) | None => losses.dropped += 1,
+            Some(FrameOutcome::Dropped(_)) | None => losses.dropped += 1,
         }
     }
 }
@@ -144,7 +146,7 @@ impl VirtualStream {
                 engine: EngineConfig {
                     method: config.method,
                     threads: config.threads,
-                    pixels_per_degree: None,
+                    pixels_per_degree: config.pixels_per_degree,
                     timer: || MonoTime::ZERO,
                     worker_started: || (),
                 },

@@ -50,6 +50,7 @@ fn replayed_plan(
         method,
         threads: count(threads),
         refresh_interval: MonoSpan::from_hz(refresh_hz),
+        pixels_per_degree: None,
     };
     let mut digester = FrameDigester::default();
     let mut frames = Vec::new();
@@ -191,6 +192,7 @@ fn an_error_of_the_sink_ends_the_replay() {
         method: Method::Hold,
         threads: count(1),
         refresh_interval: MonoSpan::from_hz(60.0),
+        pixels_per_degree: None,
     };
     let keys = timed_keys(&mut recording, &reader, &plan, KeyTiming::Stepped);
     let result = replay(*reader.format(), &config, keys, |_, _| anyhow::bail!("disk full"));

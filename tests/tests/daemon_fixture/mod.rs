@@ -20,7 +20,7 @@ use foreframe_protocol::{
     Submit, Subscribe,
 };
 use foreframed::config::SinkSpec;
-use foreframed::{Args, Daemon, Stopper, clock};
+use foreframed::{Args, Config, Daemon, Stopper, clock};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use tempfile::TempDir;
 
@@ -42,6 +42,11 @@ impl RunningDaemon {
     }
 
     pub(crate) fn start_with(sink: &str, args: Args) -> Self {
+        Self::start_config(sink, args, |_| ())
+    }
+
+    /// With a configuration that `change` has the last word on.
+    pub(crate) fn start_config(sink: &str, args: Args, change: impl FnOnce(&mut Config)) -> Self {
         let folder = private_folder();
         let sink = match sink.split_once(':') {
             Some((kind, path)) => format!("{kind}:{}", folder.path().join(path).display()),
@@ -54,7 +59,8 @@ impl RunningDaemon {
             record: args.record.map(|file| folder.path().join(file)),
             ..args
         };
-        let config = args.resolve().unwrap();
+        let mut config = args.resolve().unwrap();
+        change(&mut config);
         let (bound, is_bound) = std::sync::mpsc::channel();
         // The main loop lives on the thread that makes it.
         let thread = std::thread::spawn(move || {

@@ -27,11 +27,9 @@
 mod between;
 mod cpu;
 mod fill;
-mod gpu;
 mod scratch;
 #[cfg(test)]
 mod tests;
 
-pub use cpu::{one_cell, warp_linear};
-pub use gpu::LINEAR;
+pub use cpu::warp_linear;
 pub use scratch::LinearScratch;

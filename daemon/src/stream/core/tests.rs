@@ -1,0 +1,275 @@
+//! A stream on a clock that is set: what is shown when, and how it is counted.
+
+use std::cell::Cell;
+use std::num::NonZeroUsize;
+
+use foreframe_engine::PlaneInput;
+use foreframe_engine::Rect;
+use foreframe_engine::format::{
+    CameraMotion, MotionConvention, MotionDirection, MotionFormat, MotionUnit,
+};
+
+use super::*;
+
+const SIZE: u32 = 16;
+/// 100 Hz.
+const INTERVAL: MonoSpan = MonoSpan::from_ms(10);
+
+fn at_ms(ms: i64) -> MonoTime {
+    MonoTime::ZERO + MonoSpan::from_ms(ms)
+}
+
+/// Goes on by a millisecond each time that it is read.
+fn tick() -> MonoTime {
+    TICKS.with(|ticks| {
+        ticks.set(ticks.get() + 1);
+        at_ms(ticks.get())
+    })
+}
+
+thread_local! {
+    static TICKS: Cell<i64> = const { Cell::new(0) };
+}
+
+/// A stream and the clock that it lives by.
+struct Rig {
+    core: StreamCore,
+    now: MonoTime,
+    next_key: u64,
+}
+
+impl Rig {
+    fn new(method: Method) -> Self {
+        let format = StreamFormat {
+            motion: Some(MotionConvention {
+                format: MotionFormat::Rg32f,
+                direction: MotionDirection::PreviousToCurrent,
+                unit: MotionUnit::Pixels,
+                scale: [1.0, 1.0],
+                camera_motion: CameraMotion::Included,
+            }),
+            ..StreamFormat::rgba8(SIZE, SIZE)
+        };
+        let config = CoreConfig {
+            engine: EngineConfig {
+                method,
+                threads: NonZeroUsize::MIN,
+                pixels_per_degree: None,
+                timer: tick,
+                worker_started: || (),
+            },
+            refresh_interval: INTERVAL,
+            display_origin: MonoTime::ZERO,
+        };
+        Self { core: StreamCore::new(format, &config), now: MonoTime::ZERO, next_key: 0 }
+    }
+
+    /// A key of this content time comes now. It moves by 3 pixels per 40 ms.
+    fn key(&mut self, content_ms: i64) {
+        let content_time = at_ms(content_ms);
+        let color: Vec<u8> = (0..=255_u8).flat_map(|pixel| [pixel; 4]).collect();
+        let vector = [3.0_f32, 0.0].map(f32::to_le_bytes).concat();
+        let motion = vector.repeat(256);
+        let plane = |bytes, bytes_per_pixel: u32| PlaneInput {
+            bytes,
+            width: SIZE,
+            height: SIZE,
+            stride: SIZE * bytes_per_pixel,
+            valid: Rect::full(SIZE, SIZE),
+            jitter: [0.0; 2],
+        };
+        let input = KeyInput {
+            index: self.next_key,
+            content_time,
+            motion_from: Some(content_time - MonoSpan::from_ms(40)),
+            is_cut: false,
+            color: plane(&color, 4),
+            depth: None,
+            motion: Some(plane(&motion, 8)),
+            camera: None,
+            motion_from_camera: None,
+        };
+        self.next_key += 1;
+        self.core.on_key(&input, || self.now).unwrap();
+    }
+
+    /// Waits for the next plan's wake, and makes its picture in `work`.
+    fn make_in(&mut self, work: MonoSpan) -> (Plan, FrameOutcome) {
+        let plan = self.core.plan(self.now);
+        self.now = self.now.max(plan.wake_at);
+        let reads = Cell::new(0);
+        let (started_at, ready_at) = (self.now, self.now + work);
+        let clock = || {
+            reads.set(reads.get() + 1);
+            if reads.get() == 1 { started_at } else { ready_at }
+        };
+        let outcome = self.core.make(&plan, clock).expect("there is a key");
+        if reads.get() > 0 {
+            self.now = ready_at;
+        }
+        (plan, outcome)
+    }
+
+    fn make(&mut self) -> FrameOutcome {
+        self.make_in(MonoSpan::from_us(100)).1
+    }
+
+    /// Makes every picture whose wake comes before `until`.
+    fn make_until(&mut self, until: MonoTime) -> Vec<FrameOutcome> {
+        let mut outcomes = Vec::new();
+        let is_due = |plan: Plan| plan.content_time.is_some() && plan.wake_at < until;
+        while is_due(self.core.plan(self.now)) {
+            outcomes.push(self.make());
+        }
+        self.now = self.now.max(until);
+        outcomes
+    }
+
+    /// Keys every 40 ms, shown until this one is due.
+    fn play(&mut self, keys: i64) {
+        for key in 0..keys {
+            self.make_until(at_ms(1_000 + 40 * key));
+            self.key(1_000 + 40 * key);
+        }
+    }
+
+    fn pixels(&mut self) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        self.core.frame().write_bytes(&mut bytes);
+        bytes
+    }
+}
+
+impl Rig {
+    /// The refreshes that are in one of the four counts.
+    fn counted(&self) -> u64 {
+        let FrameCounts { real, synthesised, repeated, dropped, .. } = self.core.counts();
+        real + synthesised + repeated + dropped
+    }
+}
+
+#[test]
+fn before_the_first_key_there_is_nothing_to_show() {
+    let mut rig = Rig::new(Method::Linear);
+    let plan = rig.core.plan(at_ms(5));
+    assert_eq!(plan.content_time, None);
+    assert_eq!(rig.core.make(&plan, || at_ms(5)), None);
+    assert_eq!(rig.core.counts(), FrameCounts::default());
+}
+
+#[test]
+fn each_refresh_is_in_exactly_one_count_whatever_happens() {
+    let mut rig = Rig::new(Method::Linear);
+    rig.play(6);
+    let (first, _) = rig.make_in(MonoSpan::from_us(100));
+    let before = rig.counted();
+    // In time, one refresh too late, three too late, and then a rest until long after easing.
+    for work_ms in [1, 11, 1, 35, 1] {
+        rig.make_in(MonoSpan::from_ms(work_ms));
+    }
+    rig.make_until(rig.now + MonoSpan::from_ms(500));
+    rig.core.finish(rig.now + MonoSpan::from_ms(123));
+    let number = |time: MonoTime| time.as_ns() / INTERVAL.as_ns().unsigned_abs();
+    let refreshes = number(rig.now + MonoSpan::from_ms(123)) - number(first.present_at);
+    assert_eq!(rig.counted() - before, refreshes, "{:?}", rig.core.counts());
+    let counts = rig.core.counts();
+    assert!(counts.dropped >= 2, "{counts:?}");
+    assert!(counts.repeated > 30 && counts.real > 0 && counts.synthesised > 0, "{counts:?}");
+}
+
+#[test]
+fn a_dropped_refresh_is_not_counted_as_repeated_too() {
+    let mut rig = Rig::new(Method::Linear);
+    rig.play(6);
+    rig.make();
+    let before = rig.core.counts();
+    let (_, outcome) = rig.make_in(MonoSpan::from_ms(11));
+    assert!(matches!(outcome, FrameOutcome::Dropped(_)), "{outcome:?}");
+    let FrameOutcome::Presented(next) = rig.make() else { panic!("nothing is shown") };
+    let counts = rig.core.counts();
+    let passed = next.repeats_before;
+    assert_eq!(counts.dropped, before.dropped + 1);
+    assert_eq!(counts.repeated, before.repeated + passed - 1, "{passed} refreshes in between");
+    assert!(passed >= 1);
+}
+
+#[test]
+fn a_dropped_picture_tells_what_it_cost_and_what_it_was() {
+    let mut rig = Rig::new(Method::Linear);
+    rig.play(6);
+    rig.make();
+    let FrameOutcome::Dropped(dropped) = rig.make_in(MonoSpan::from_ms(11)).1 else {
+        panic!("nothing is dropped");
+    };
+    assert_eq!(dropped.kind, FrameKind::Synthesised);
+    assert_eq!(dropped.work, MonoSpan::from_ms(1), "one tick of the engine's clock");
+}
+
+#[test]
+fn what_is_shown_while_nothing_moves_is_counted_without_waiting_for_the_next_picture() {
+    let mut rig = Rig::new(Method::Hold);
+    rig.key(1_000);
+    let outcomes = rig.make_until(at_ms(200));
+    let FrameOutcome::Presented(first) = outcomes[0] else { panic!("{:?}", outcomes[0]) };
+    assert!(outcomes[1..].iter().all(|outcome| *outcome == FrameOutcome::Repeated));
+    let counts = rig.core.counts();
+    assert_eq!((counts.real, counts.repeated), (1, outcomes.len() as u64 - 1));
+    // The thread waits for a key alone now; nobody plans, and time goes by.
+    rig.core.finish(at_ms(1_000));
+    let shown_ms = (at_ms(1_000) - first.presented_at).as_ns() / 1_000_000;
+    assert_eq!(rig.core.counts().repeated as i64, shown_ms / 10);
+}
+
+#[test]
+fn a_late_key_is_eased_into_and_never_runs_back() {
+    let mut rig = Rig::new(Method::Linear);
+    rig.play(6);
+    // The next key is due at 1240 and comes 70 ms late.
+    let mut outcomes = rig.make_until(at_ms(1_310));
+    rig.key(1_240);
+    outcomes.extend(rig.make_until(at_ms(1_340)));
+    let content: Vec<_> = outcomes
+        .iter()
+        .filter_map(|outcome| match outcome {
+            FrameOutcome::Presented(frame) => Some(frame.content_time),
+            _ => None,
+        })
+        .collect();
+    assert!(content.is_sorted(), "{content:?}");
+    assert!(content.len() > 5);
+    assert_eq!(rig.core.counts().dropped, 0);
+}
+
+#[test]
+fn a_dropped_picture_does_not_become_the_one_that_is_compared_with() {
+    let mut rig = Rig::new(Method::Hold);
+    rig.key(1_000);
+    rig.make();
+    rig.key(1_040);
+    let (_, outcome) = rig.make_in(MonoSpan::from_ms(25));
+    assert!(matches!(outcome, FrameOutcome::Dropped(_)), "{outcome:?}");
+    // The key has still not been on the display, so it is not a repetition.
+    let FrameOutcome::Presented(frame) = rig.make() else { panic!("the key is never shown") };
+    assert_eq!((frame.key_index, frame.kind), (1, FrameKind::Real));
+}
+
+#[test]
+fn blend_calls_a_copied_key_real_and_a_mean_synthesised() {
+    let mut rig = Rig::new(Method::Blend);
+    rig.play(8);
+    for outcome in rig.make_until(at_ms(1_600)) {
+        let FrameOutcome::Presented(frame) = outcome else { continue };
+        let newest = frame.key_content_time;
+        let is_between =
+            frame.content_time < newest && frame.content_time > newest - MonoSpan::from_ms(40);
+        let expected = if is_between { FrameKind::Synthesised } else { FrameKind::Real };
+        assert_eq!(frame.kind, expected, "{frame:?}");
+    }
+    // Alone, without a key before it, a key is copied whatever the content time.
+    let mut rig = Rig::new(Method::Blend);
+    rig.key(1_000);
+    let FrameOutcome::Presented(frame) = rig.make() else { panic!("the key is never shown") };
+    assert_eq!(frame.kind, FrameKind::Real);
+    let key: Vec<u8> = (0..=255_u8).flat_map(|pixel| [pixel; 4]).collect();
+    assert_eq!(rig.pixels(), key);
+}
