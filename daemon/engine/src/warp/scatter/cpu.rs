@@ -72,7 +72,8 @@ impl SourceField {
 
 /// `p_cell` of (1): the phase in the unit that turns velocities into Q8 cells.
 #[expect(clippy::cast_possible_wrap, reason = "at most the phase, 16384")]
-fn phase_in_cells(phase: Phase, axis: &FieldAxis) -> i32 {
+#[must_use]
+pub fn phase_in_cells(phase: Phase, axis: &FieldAxis) -> i32 {
     let pixels = axis.pixels();
     ((phase.q12().cast_unsigned() * axis.cells() + pixels / 2) / pixels) as i32
 }

@@ -21,10 +21,12 @@
 //! the source rows that can reach it, so the result is the same for any number of threads.
 
 mod cpu;
+mod gpu;
 #[cfg(test)]
 mod tests;
 
-pub use cpu::{SourceField, scatter};
+pub use cpu::{SourceField, phase_in_cells, scatter};
+pub use gpu::{SCATTER, SOURCE};
 
 /// What a target cell holds that no source cell lands on.
 pub const NO_SOURCE: u32 = u32::MAX;
