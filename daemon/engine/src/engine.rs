@@ -9,7 +9,6 @@ use std::sync::Arc;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::backend::fallback::Backend;
-#[cfg(feature = "gpu")]
 use crate::backend::gpu::Gpu;
 use crate::backend::{BackendStatus, FrameInput};
 use crate::color::ColorPlane;
@@ -112,7 +111,6 @@ impl Engine {
 
     /// Makes pictures on `gpu` instead of the CPU, as long as it works. To be called before the
     /// first key. [`Engine::backend`] says how it went.
-    #[cfg(feature = "gpu")]
     pub fn use_gpu(&mut self, gpu: &Arc<Gpu>) {
         self.backend.use_gpu(gpu, self.format.color, self.config.method);
     }

@@ -5,18 +5,17 @@
 //! that the engine holds, and all that follow. Pictures are the same either way; [`BackendStatus`]
 //! says what happened. There is no way back: a driver that failed once is not tried again.
 
+use std::sync::Arc;
+
 use rayon::ThreadPool;
 
 use super::FrameInput;
 use super::cpu::CpuBackend;
-#[cfg(feature = "gpu")]
 use super::gpu::{Gpu, GpuBackend, GpuError};
-use crate::color::ColorPlane;
+use crate::color::{ColorFormat, ColorPlane};
 use crate::field::FieldMap;
 use crate::key::KeyFrame;
 use crate::method::Method;
-#[cfg(feature = "gpu")]
-use std::sync::Arc;
 
 /// What makes the pictures of a stream.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -37,7 +36,6 @@ impl Default for BackendStatus {
 #[derive(Debug, Default)]
 pub(crate) struct Backend {
     cpu: CpuBackend,
-    #[cfg(feature = "gpu")]
     gpu: Option<GpuBackend>,
     status: BackendStatus,
 }
@@ -48,13 +46,7 @@ impl Backend {
     }
 
     /// Runs on `gpu` from the next key on, in a stream that has had none.
-    #[cfg(feature = "gpu")]
-    pub(crate) fn use_gpu(
-        &mut self,
-        gpu: &Arc<Gpu>,
-        format: crate::color::ColorFormat,
-        method: Method,
-    ) {
+    pub(crate) fn use_gpu(&mut self, gpu: &Arc<Gpu>, format: ColorFormat, method: Method) {
         match GpuBackend::new(gpu, format, method) {
             Ok(backend) => {
                 self.gpu = Some(backend);
@@ -70,10 +62,8 @@ impl Backend {
         pool: &ThreadPool,
         method: Method,
         key: &KeyFrame,
-        #[cfg_attr(not(feature = "gpu"), expect(unused_variables, reason = "for the GPU alone"))]
         map: &FieldMap,
     ) {
-        #[cfg(feature = "gpu")]
         if let Some(gpu) = &mut self.gpu {
             match gpu.take_key(key, map) {
                 Ok(()) => return,
@@ -86,7 +76,6 @@ impl Backend {
     /// Makes a picture after the key that was taken last into `out`, which has the size and format
     /// of the keys.
     pub(crate) fn make(&mut self, pool: &ThreadPool, frame: &FrameInput<'_>, out: &mut ColorPlane) {
-        #[cfg(feature = "gpu")]
         if let Some(gpu) = &mut self.gpu {
             match gpu.make(frame, out) {
                 Ok(()) => return,
@@ -99,7 +88,6 @@ impl Backend {
         self.cpu.make(pool, frame, out);
     }
 
-    #[cfg(feature = "gpu")]
     fn fall(&mut self, error: &GpuError) {
         self.gpu = None;
         self.status = BackendStatus { fell_back: Some(error.to_string()), ..Default::default() };

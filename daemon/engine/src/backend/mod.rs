@@ -9,7 +9,7 @@
 pub mod choice;
 pub mod cpu;
 pub(crate) mod fallback;
-#[cfg(feature = "gpu")]
+#[cfg_attr(not(feature = "gpu"), path = "no_gpu.rs")]
 pub mod gpu;
 pub mod shader;
 

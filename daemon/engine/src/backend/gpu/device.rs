@@ -16,6 +16,8 @@ use crate::params::format_code;
 /// How long a device may take to answer. Far more than a slow software adapter needs for a large
 /// picture; without it a hung device would hang its stream.
 const TIMEOUT: Duration = Duration::from_secs(20);
+/// How long a device that has failed may take to say that it is lost.
+const LAST_WORDS: Duration = Duration::from_secs(1);
 
 /// An open device.
 #[derive(Debug)]
@@ -64,7 +66,10 @@ impl Gpu {
         let kept = Arc::clone(&fault);
         device.on_uncaptured_error(Arc::new(move |error| note(&kept, named(&error))));
         let kept = Arc::clone(&fault);
-        device.set_device_lost_callback(move |_, why| note(&kept, GpuError::Lost { why }));
+        device.set_device_lost_callback(move |reason, message| {
+            let why = format!("{reason:?} {message}").trim_end().to_owned();
+            note(&kept, GpuError::Lost { why });
+        });
         Ok(Arc::new(Self { name, device, queue, fault, shaders: Mutex::default() }))
     }
 
@@ -72,6 +77,16 @@ impl Gpu {
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// Whether it has failed for good: nothing that is started on it now will work.
+    #[must_use]
+    pub fn is_lost(&self) -> bool {
+        self.fault().is_some()
+    }
+
+    fn fault(&self) -> Option<GpuError> {
+        self.fault.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// Gives the device up, as if it had been lost. For tests of what happens then.
@@ -93,11 +108,18 @@ impl Gpu {
         let result = calls();
         // Scopes end in the opposite order of their beginnings.
         let errors = scopes.into_iter().rev().map(|scope| pollster::block_on(scope.pop()));
-        let errors: Vec<_> = errors.collect();
-        if let Some(fault) = self.fault.lock().unwrap_or_else(PoisonError::into_inner).clone() {
+        let error = errors.collect::<Vec<_>>().into_iter().flatten().next();
+        if error.is_some() || result.is_err() {
+            // If the device was lost, that is the reason; it is told once the queue is empty.
+            let polled = self
+                .device
+                .poll(wgpu::PollType::Wait { submission_index: None, timeout: Some(LAST_WORDS) });
+            drop(polled);
+        }
+        if let Some(fault) = self.fault() {
             return Err(fault);
         }
-        if let Some(error) = errors.into_iter().flatten().next() {
+        if let Some(error) = error {
             return Err(named(&error));
         }
         result
@@ -135,7 +157,7 @@ impl Gpu {
         Ok(compiled)
     }
 
-    fn compile(
+    pub(super) fn compile(
         &self,
         shader: &Shader,
         text: &str,
@@ -197,7 +219,8 @@ fn bind_group_layout(device: &wgpu::Device, shader: &Shader) -> wgpu::BindGroupL
 }
 
 fn named(error: &wgpu::Error) -> GpuError {
-    let why = error.to_string();
+    // On one line, as errors here are.
+    let why = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
     match error {
         wgpu::Error::OutOfMemory { .. } => GpuError::OutOfMemory { why },
         wgpu::Error::Validation { .. } | wgpu::Error::Internal { .. } => GpuError::Refused { why },

@@ -65,7 +65,7 @@ type Step = (&'static Shader, Arc<Compiled>);
 
 /// What one stream keeps on a device.
 #[derive(Debug)]
-pub struct GpuBackend {
+pub(crate) struct GpuBackend {
     gpu: Arc<Gpu>,
     method: Method,
     key_steps: Vec<Step>,
@@ -83,7 +83,11 @@ impl GpuBackend {
     ///
     /// # Errors
     /// If the device is gone or takes a shader not.
-    pub fn new(gpu: &Arc<Gpu>, format: ColorFormat, method: Method) -> Result<Self, GpuError> {
+    pub(crate) fn new(
+        gpu: &Arc<Gpu>,
+        format: ColorFormat,
+        method: Method,
+    ) -> Result<Self, GpuError> {
         if method == Method::Grid {
             return Err(GpuError::Refused { why: "no shader makes `grid`".to_owned() });
         }
@@ -103,17 +107,11 @@ impl GpuBackend {
         })
     }
 
-    /// The device.
-    #[must_use]
-    pub fn gpu(&self) -> &Arc<Gpu> {
-        &self.gpu
-    }
-
     /// Sends `key` up. Returns before it is there.
     ///
     /// # Errors
     /// If the device is gone, or the key too large for it.
-    pub fn take_key(&mut self, key: &KeyFrame, map: &FieldMap) -> Result<(), GpuError> {
+    pub(crate) fn take_key(&mut self, key: &KeyFrame, map: &FieldMap) -> Result<(), GpuError> {
         let moves = !key.velocity.data().is_empty();
         if self.method == Method::Hold || (self.method != Method::Blend && !moves) {
             return Ok(());
@@ -199,7 +197,11 @@ impl GpuBackend {
     ///
     /// # Errors
     /// If the device is gone, refuses, or does not answer; `out` is then unspecified.
-    pub fn make(&mut self, frame: &FrameInput<'_>, out: &mut ColorPlane) -> Result<(), GpuError> {
+    pub(crate) fn make(
+        &mut self,
+        frame: &FrameInput<'_>,
+        out: &mut ColorPlane,
+    ) -> Result<(), GpuError> {
         let gpu = Arc::clone(&self.gpu);
         gpu.guard(|| {
             let params = FrameParams::new(frame.newest, frame.map, frame.phase);

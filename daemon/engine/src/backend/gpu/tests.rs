@@ -214,3 +214,43 @@ fn one_pixel_of_the_key_that_differs_is_found() {
         }
     }
 }
+
+#[test]
+fn a_plane_that_no_binding_holds_is_refused_with_both_numbers() {
+    for gpu in test_gpus("a_plane_that_no_binding_holds_is_refused_with_both_numbers") {
+        let limit = gpu.device.limits().max_storage_buffer_binding_size;
+        let error = Planes::default().sized(&gpu, Slot::Color, limit + 4).unwrap_err();
+        assert_eq!(error, GpuError::TooLarge { needed: limit + 4, limit });
+        let of_4096x2160_halves = 4096 * 2160 * 8;
+        assert!(limit >= of_4096x2160_halves, "{} binds only {limit}", gpu.name());
+    }
+}
+
+#[test]
+fn a_shader_that_does_not_compile_is_an_error_and_the_device_goes_on() {
+    for gpu in test_gpus("a_shader_that_does_not_compile_is_an_error_and_the_device_goes_on") {
+        let wrong_texts = [
+            "no shader at all",
+            "@compute @workgroup_size(16, 16) fn blend() { undeclared(); }",
+            "@compute @workgroup_size(16, 16) fn another_name() {}",
+        ];
+        for text in wrong_texts {
+            let error = gpu.compile(&BLEND, text, ColorFormat::Rgba8).unwrap_err();
+            assert!(matches!(error, GpuError::Refused { .. }), "{text}: {error}");
+        }
+        assert!(!gpu.is_lost());
+        GpuBackend::new(&gpu, ColorFormat::Rgba8, Method::Blend).unwrap();
+    }
+}
+
+#[test]
+fn a_step_before_its_key_is_an_error() {
+    for gpu in test_gpus("a_step_before_its_key_is_an_error") {
+        let key = key(noise(ColorFormat::Rgba8, 4, 4, 1), Plane::default(), Plane::default());
+        let mut backend = GpuBackend::new(&gpu, ColorFormat::Rgba8, Method::Blend).unwrap();
+        let mut out = key.color.clone();
+        let map = FieldMap::default();
+        let made = backend.make(&input(Method::Blend, Phase::ZERO, &key, &key, &map), &mut out);
+        assert!(matches!(made, Err(GpuError::Refused { .. })), "{made:?}");
+    }
+}
