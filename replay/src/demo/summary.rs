@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use super::Settings;
 use super::application::Submissions;
-use super::audience::{Kept, Seen, Shown, psnr_rgb_db};
+use super::audience::{Kept, ROW_STEP, Seen, Shown, psnr_rgb_db};
 use super::rehearsal::Rehearsal;
 use crate::draw::Rgba8Image;
 use crate::pictures::{ContactSheetRow, PresentKind, TimelineEvent, contact_sheet, timeline};
@@ -69,9 +69,9 @@ pub struct Summary {
     pub psnr_rgb_db: Option<f64>,
     /// The worst of them.
     pub psnr_rgb_min_db: Option<f64>,
-    /// In-between frames that were compared.
+    /// In-between frames that were compared, by one row in [`ROW_STEP`] each.
     pub compared: u64,
-    /// Real frames that were compared and differ from their key.
+    /// Real frames that differ from their key in the rows that were compared, as above.
     pub real_frames_changed: u64,
     /// Time to fill a slot and submit it. None without keys.
     pub fill_and_submit_ms: Option<f64>,
@@ -168,7 +168,7 @@ impl Summary {
             ),
             format!("content judder      {}", or_none(self.content_judder, 4, " of a refresh interval")),
             format!(
-                "error               {} PSNR on average, {} at worst, {} of {} in-betweens compared",
+                "error               {} PSNR on average, {} at worst, {} of {} in-betweens compared, 1 row in {ROW_STEP}",
                 or_none(self.psnr_rgb_db, 1, " dB"),
                 or_none(self.psnr_rgb_min_db, 1, " dB"),
                 self.compared,
@@ -230,7 +230,7 @@ impl Summary {
             let key = rehearsal.keys.get(usize::try_from(shown.key_index).ok()?)?;
             Some(ContactSheetRow {
                 label: format!("key {}, phase {:.2}", shown.key_index, shown.phase),
-                detail: format!("{:.1} dB", psnr_rgb_db(&kept.rgba, &without_alpha(truth), 1)),
+                detail: format!("{:.1} dB", psnr_rgb_db(&kept.rgba, &without_alpha(truth))),
                 key: image(&key.color.rgba)?,
                 in_between: image(&kept.rgba)?,
                 truth: image(truth)?,
@@ -264,7 +264,7 @@ fn compared(seen: &Seen, rehearsal: &Rehearsal) -> Vec<f64> {
     }
     let against_truth = |kept: &Kept| {
         let truth = rehearsal.render_truth(kept.shown.content_ns);
-        psnr_rgb_db(&kept.rgba, &without_alpha(&truth), 1)
+        psnr_rgb_db(&kept.rgba, &without_alpha(&truth))
     };
     seen.kept.iter().map(against_truth).collect()
 }
