@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    completions, demo, export, import, info, man, pacing, replay, scenes, score, serve,
+    bench, completions, demo, export, import, info, man, pacing, replay, scenes, score, serve,
 };
 use crate::output::Output;
 use foreframed::UsageError;
@@ -42,6 +42,8 @@ pub enum Command {
     Replay(replay::Args),
     /// Predict left-out frames of captures and measure how far off the methods are.
     Score(score::Args),
+    /// Time the engine on built-in scenes, beside plain copies of the same bytes.
+    Bench(bench::Args),
     /// Run the pacer against a simulated display and clock.
     Pacing(pacing::Args),
     /// Print a shell completion script.
@@ -83,6 +85,7 @@ impl Cli {
             Command::Info(args) => info::run(&args, &output),
             Command::Replay(args) => replay::run(&args, &output),
             Command::Score(args) => score::run(&args, &output),
+            Command::Bench(args) => bench::run(&args, &output),
             Command::Pacing(args) => pacing::run(&args, &output),
             Command::Completions(args) => completions::run(&args),
             Command::Man(args) => man::run(&args, &output),

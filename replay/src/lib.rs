@@ -4,6 +4,7 @@
 //! the same definitions. Each module in [`commands`] owns one command and does no more than read
 //! its arguments, call a library, and report.
 
+pub mod bench;
 pub mod cli;
 pub mod commands;
 pub mod demo;

@@ -53,6 +53,30 @@ pub fn for_each_chunk<T: Send>(
     });
 }
 
+/// Calls `row(y, row of a, row of b)` for every row of two planes of the same height.
+#[expect(clippy::cast_possible_truncation, reason = "planes have at most 8192 rows")]
+pub fn for_each_row_of_two<A: Send, B: Send>(
+    pool: &ThreadPool,
+    a: &mut Plane<A>,
+    b: &mut Plane<B>,
+    row: impl Fn(u32, &mut [A], &mut [B]) + Sync,
+) {
+    let lengths = [a.width() as usize, b.width() as usize];
+    if lengths.contains(&0) {
+        return;
+    }
+    pool.install(|| {
+        let a = a.data_mut().par_chunks_mut(lengths[0]);
+        let rows = a.zip(b.data_mut().par_chunks_mut(lengths[1]));
+        rows.enumerate().with_min_len(MIN_ROWS).for_each(|(y, (a, b))| {
+            widest(
+                #[inline(always)]
+                || row(y as u32, a, b),
+            );
+        });
+    });
+}
+
 /// Calls `band(first_row, rows of a, rows of b)` for every run of `rows` rows of two planes of the
 /// same width.
 #[expect(clippy::cast_possible_truncation, reason = "planes have at most 8192 rows")]

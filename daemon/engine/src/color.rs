@@ -10,10 +10,8 @@ mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod sse2;
 
-use zerocopy::{FromBytes, Immutable, IntoBytes};
-
 use crate::plane::{Plane, Rect};
-use crate::warp::sample::sample;
+use crate::warp::sample::{Positions, sample};
 
 /// How the channels of a colour plane are stored.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -39,17 +37,17 @@ impl ColorFormat {
 }
 
 /// One pixel of [`ColorFormat::Rgba8`]: red in the lowest byte.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, FromBytes, IntoBytes, Immutable)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[repr(transparent)]
 pub struct Rgba8(pub u32);
 
 /// One pixel of [`ColorFormat::Rgb10a2`].
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, FromBytes, IntoBytes, Immutable)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[repr(transparent)]
 pub struct Rgb10a2(pub u32);
 
 /// One pixel of [`ColorFormat::Rgba16f`], each channel as [`half_to_ordered`] maps it.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, FromBytes, IntoBytes, Immutable)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(transparent)]
 pub struct OrderedRgba16(pub [u16; 4]);
 
@@ -80,9 +78,11 @@ pub trait Texel: Copy + Default + PartialEq + Send + Sync + 'static {
         }
     }
 
-    /// [`sample`] at each of the Q8 positions `xs`, `ys` into `out`, all of the same length.
-    fn sample_each(plane: &Plane<Self>, valid: Rect, xs: &[i32], ys: &[i32], out: &mut [Self]) {
-        for (texel, (&x, &y)) in out.iter_mut().zip(xs.iter().zip(ys)) {
+    /// [`sample`] at each of `positions` into `out`, which is as long.
+    #[inline(always)]
+    fn sample_each(plane: &Plane<Self>, valid: Rect, positions: &impl Positions, out: &mut [Self]) {
+        for (i, texel) in out.iter_mut().enumerate() {
+            let [x, y] = positions.at(i);
             *texel = sample(plane, valid, x, y);
         }
     }
@@ -157,19 +157,16 @@ impl Texel for Rgba8 {
     }
 
     #[cfg(target_arch = "x86_64")]
-    fn sample_each(plane: &Plane<Self>, valid: Rect, xs: &[i32], ys: &[i32], out: &mut [Self]) {
-        let (out, rest) = if is_x86_feature_detected!("avx2") {
-            let ((xs, _), (ys, _)) = (xs.as_chunks(), ys.as_chunks());
-            let (eights, rest) = out.as_chunks_mut();
-            for (out, (xs, ys)) in eights.iter_mut().zip(xs.iter().zip(ys)) {
-                // SAFETY: the processor has AVX2, asked for just above.
-                unsafe { avx2::sample_eight(plane, valid, xs, ys, out) };
-            }
-            (eights.len() * avx2::LANES, rest)
+    #[inline(always)]
+    fn sample_each(plane: &Plane<Self>, valid: Rect, positions: &impl Positions, out: &mut [Self]) {
+        let done = if is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2, asked for just above.
+            unsafe { avx2::sample_each(plane, valid, positions, out) }
         } else {
-            (0, out)
+            0
         };
-        for (texel, (&x, &y)) in rest.iter_mut().zip(xs[out..].iter().zip(&ys[out..])) {
+        for (i, texel) in out.iter_mut().enumerate().skip(done) {
+            let [x, y] = positions.at(i);
             *texel = sample(plane, valid, x, y);
         }
     }
@@ -283,25 +280,6 @@ impl ColorPlane {
         }
     }
 
-    /// The pixels in canonical form, as they lie in memory.
-    #[must_use]
-    pub fn as_bytes(&self) -> &[u8] {
-        match self {
-            Self::Rgba8(plane) => plane.data().as_bytes(),
-            Self::Rgb10a2(plane) => plane.data().as_bytes(),
-            Self::Rgba16f(plane) => plane.data().as_bytes(),
-        }
-    }
-
-    /// The pixels in canonical form, as they lie in memory.
-    pub fn as_mut_bytes(&mut self) -> &mut [u8] {
-        match self {
-            Self::Rgba8(plane) => plane.data_mut().as_mut_bytes(),
-            Self::Rgb10a2(plane) => plane.data_mut().as_mut_bytes(),
-            Self::Rgba16f(plane) => plane.data_mut().as_mut_bytes(),
-        }
-    }
-
     /// Appends the pixels in wire form ([`ColorFormat`], row-major, no padding) to `out`.
     pub fn write_bytes(&self, out: &mut Vec<u8>) {
         match self {
@@ -335,7 +313,7 @@ pub const fn ordered_to_half(ordered: u16) -> u16 {
 mod tests {
     use super::*;
     use crate::testing::hash;
-    use crate::warp::sample::sample_run;
+    use crate::warp::sample::{Listed, sample_run};
     use proptest::prelude::*;
 
     proptest! {
@@ -365,7 +343,7 @@ mod tests {
             let valid = Rect { x: left, y: top, width, height };
             let (xs, ys): (Vec<i32>, Vec<i32>) = positions.iter().copied().unzip();
             let mut out = vec![Rgba8::default(); xs.len()];
-            Rgba8::sample_each(&plane, valid, &xs, &ys, &mut out);
+            Rgba8::sample_each(&plane, valid, &Listed { xs: &xs, ys: &ys }, &mut out);
             for ((x, y), texel) in positions.into_iter().zip(out) {
                 prop_assert_eq!(texel, sample(&plane, valid, x, y), "at {}, {}", x, y);
             }
@@ -391,7 +369,7 @@ mod tests {
             });
             let (xs, ys): (Vec<i32>, Vec<i32>) = places.unzip();
             let mut out = vec![Rgba8::default(); xs.len()];
-            Rgba8::sample_each(&plane, valid, &xs, &ys, &mut out);
+            Rgba8::sample_each(&plane, valid, &Listed { xs: &xs, ys: &ys }, &mut out);
             for ((x, y), texel) in xs.into_iter().zip(ys).zip(out) {
                 prop_assert_eq!(texel, sample(&plane, valid, x, y), "at {}, {}", x, y);
             }

@@ -13,6 +13,8 @@
 //! All divisions round towards minus infinity and results are clamped to the grid. The divisions
 //! are done once per column and row, into tables, and not once per pixel.
 
+use std::ops::Range;
+
 use crate::plane::Rect;
 
 /// One axis of the map.
@@ -25,6 +27,8 @@ pub struct FieldAxis {
     centre: Vec<i32>,
     cell: Vec<u16>,
     before: Vec<[u16; 2]>,
+    /// The first pixel of each cell, and the end of the last.
+    pixels: Vec<u16>,
 }
 
 /// Both axes of the map between one valid rectangle and one field grid.
@@ -68,6 +72,10 @@ impl FieldAxis {
             let between = (place.div_euclid(span) - 128).clamp(0, last * 256);
             self.before.push([(between >> 8) as u16, (between & 0xff) as u16]);
         }
+        self.pixels.clear();
+        self.pixels.extend(
+            (0..=cells).map(|i| self.cell.partition_point(|cell| u32::from(*cell) < i) as u16),
+        );
     }
 
     /// Number of cells.
@@ -98,6 +106,12 @@ impl FieldAxis {
     #[must_use]
     pub fn cell_of(&self, index: u32) -> u32 {
         u32::from(self.cell[index as usize])
+    }
+
+    /// The pixels, counted from the first, that a cell holds; none where cells are finer than that.
+    #[must_use]
+    pub fn pixels_of(&self, cell: usize) -> Range<usize> {
+        usize::from(self.pixels[cell])..usize::from(self.pixels[cell + 1])
     }
 
     /// [`Self::cell_of`] of `count` pixels from `index` on.
@@ -160,6 +174,11 @@ mod tests {
                 seen[axis.cell_of(index) as usize] = true;
             }
             assert!(seen.into_iter().all(|cell| cell), "{length} pixels, {cells} cells");
+            let shared_out: Vec<_> = (0..cells as usize).flat_map(|i| axis.pixels_of(i)).collect();
+            assert!(shared_out.into_iter().eq(0..length as usize), "each pixel is in one cell");
+            assert!(
+                axis.pixels_of(cells as usize / 2).all(|i| axis.cell_of(i as u32) == cells / 2)
+            );
             for cell in 0..cells {
                 let pixel = (axis.centre(cell) + 128).div_euclid(256).cast_unsigned();
                 assert!((11..11 + length).contains(&pixel), "cell {cell} of {cells}");

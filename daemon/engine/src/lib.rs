@@ -23,7 +23,6 @@ pub mod kernels;
 pub mod key;
 pub mod method;
 pub mod pacing;
-pub mod params;
 pub mod phase;
 pub mod plane;
 mod simd;

@@ -37,7 +37,7 @@ pub struct Args {
     #[arg(long, value_name = "DIR", group = "target", requires = "name")]
     pub png: Option<PathBuf>,
     /// Size of the pictures.
-    #[arg(long, value_name = "WxH", default_value = "640x360", value_parser = size)]
+    #[arg(long, value_name = "WxH", default_value = "640x360", value_parser = parse_size)]
     pub size: Size,
     /// Frames per second, 1 to 1000.
     #[arg(long, value_name = "HZ", default_value_t = 120.0, value_parser = number(1.0, 1000.0))]
@@ -229,7 +229,7 @@ impl Shot<'_> {
 }
 
 /// Parses `WIDTHxHEIGHT`.
-fn size(text: &str) -> Result<Size, String> {
+pub(crate) fn parse_size(text: &str) -> Result<Size, String> {
     let side = |text: &str| text.parse().ok().filter(|side| (1..=Size::MAX).contains(side));
     text.split_once('x')
         .and_then(|(width, height)| Some(Size::new(side(width)?, side(height)?)))

@@ -70,7 +70,7 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
         scores.push(score);
     }
     progress.finish_and_clear();
-    let report = Report::new(options.threads.get(), scores);
+    let report = Report::new("cpu", options.threads.get(), scores);
     output.result(&report, &report.to_text())
 }
 
@@ -80,7 +80,7 @@ pub(crate) fn all_processors() -> NonZeroUsize {
 }
 
 /// Methods by name, each once, in the order of the list; `all` for every one.
-fn parse_methods(list: &str) -> Result<Methods, String> {
+pub(crate) fn parse_methods(list: &str) -> Result<Methods, String> {
     if list == "all" {
         return Ok(Methods(Method::ALL.to_vec()));
     }

@@ -8,17 +8,25 @@ use std::arch::x86_64::{
     _mm256_cvtsi256_si32, _mm256_i32gather_epi32, _mm256_loadu_si256, _mm256_madd_epi16,
     _mm256_max_epi32, _mm256_min_epi32, _mm256_mullo_epi16, _mm256_mullo_epi32, _mm256_or_si256,
     _mm256_packs_epi32, _mm256_packus_epi16, _mm256_permutevar8x32_epi32, _mm256_set1_epi16,
-    _mm256_set1_epi32, _mm256_setzero_si256, _mm256_shuffle_epi32, _mm256_slli_epi32,
-    _mm256_srai_epi32, _mm256_srli_epi32, _mm256_storeu_si256, _mm256_sub_epi32,
+    _mm256_set1_epi32, _mm256_setr_epi32, _mm256_setzero_si256, _mm256_shuffle_epi32,
+    _mm256_slli_epi32, _mm256_srai_epi32, _mm256_srli_epi32, _mm256_storeu_si256, _mm256_sub_epi32,
     _mm256_testz_si256, _mm256_unpackhi_epi8, _mm256_unpackhi_epi16, _mm256_unpackhi_epi32,
     _mm256_unpacklo_epi8, _mm256_unpacklo_epi16, _mm256_unpacklo_epi32, _mm256_xor_si256,
 };
 
 use super::Rgba8;
 use crate::plane::{Plane, Rect};
+use crate::warp::sample::Positions;
 
 /// Pixels of one step.
 pub(super) const LANES: usize = 8;
+
+/// One axis of a valid rectangle.
+struct Axis {
+    first: __m256i,
+    last: __m256i,
+    last_pixel: __m256i,
+}
 
 /// One axis of eight positions: the pixel before, the pixel after, the way between them.
 struct Between {
@@ -27,60 +35,81 @@ struct Between {
     way: __m256i,
 }
 
-#[inline]
-#[target_feature(enable = "avx2")]
-fn between(position: __m256i, start: u32, length: u32) -> Between {
-    let last_pixel = (start + length - 1).cast_signed();
-    let first = _mm256_set1_epi32((start << 8).cast_signed());
-    let last = _mm256_set1_epi32(last_pixel << 8);
-    let clamped = _mm256_min_epi32(_mm256_max_epi32(position, first), last);
-    let low = _mm256_srai_epi32(clamped, 8);
-    let next = _mm256_add_epi32(low, _mm256_set1_epi32(1));
-    Between {
-        low,
-        high: _mm256_min_epi32(next, _mm256_set1_epi32(last_pixel)),
-        way: _mm256_and_si256(clamped, _mm256_set1_epi32(0xff)),
+impl Axis {
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn new(start: u32, length: u32) -> Self {
+        let last_pixel = (start + length - 1).cast_signed();
+        Self {
+            first: _mm256_set1_epi32((start << 8).cast_signed()),
+            last: _mm256_set1_epi32(last_pixel << 8),
+            last_pixel: _mm256_set1_epi32(last_pixel),
+        }
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn between(&self, position: __m256i) -> Between {
+        let clamped = _mm256_min_epi32(_mm256_max_epi32(position, self.first), self.last);
+        let low = _mm256_srai_epi32(clamped, 8);
+        let next = _mm256_add_epi32(low, _mm256_set1_epi32(1));
+        Between {
+            low,
+            high: _mm256_min_epi32(next, self.last_pixel),
+            way: _mm256_and_si256(clamped, _mm256_set1_epi32(0xff)),
+        }
     }
 }
 
-/// The colours of `plane` at the Q8 positions `xs`, `ys`, clamped to `valid`.
+/// The colours of `plane` at `positions`, clamped to `valid`, into `out`, as many as whole steps
+/// hold; returns their number.
 ///
 /// # Panics
 /// If `valid` does not lie inside the plane, or the plane has 2^31 pixels or more.
+#[inline]
 #[target_feature(enable = "avx2")]
-pub(super) fn sample_eight(
+pub(super) fn sample_each(
     plane: &Plane<Rgba8>,
     valid: Rect,
-    xs: &[i32; LANES],
-    ys: &[i32; LANES],
-    out: &mut [Rgba8; LANES],
-) {
+    positions: &impl Positions,
+    out: &mut [Rgba8],
+) -> usize {
     assert!(valid.fits(plane.width(), plane.height()), "the valid rectangle lies inside the plane");
     assert!(i32::try_from(plane.data().len()).is_ok(), "every pixel has a 32-bit index");
-    // SAFETY: both arrays hold 8 values of 32 bits, and the load needs no alignment.
-    let (x, y) =
-        unsafe { (_mm256_loadu_si256(xs.as_ptr().cast()), _mm256_loadu_si256(ys.as_ptr().cast())) };
-    let (x, y) = (between(x, valid.x, valid.width), between(y, valid.y, valid.height));
-    let rows = match near_rows(plane, &x, &y) {
-        Some(rows) => rows,
-        None => {
-            let width = _mm256_set1_epi32(plane.width().cast_signed());
-            let [top, bottom] = [y.low, y.high].map(|row| _mm256_mullo_epi32(row, width));
-            let read = |row: __m256i, column: __m256i| {
-                let index = _mm256_add_epi32(row, column);
-                // SAFETY: `between` clamps to `valid`, which lies inside the plane (asserted
-                // above), so row * width + column is the index of a pixel of 4 bytes.
-                unsafe { _mm256_i32gather_epi32::<4>(plane.data().as_ptr().cast(), index) }
-            };
-            [
-                across(read(top, x.low), read(top, x.high), x.way),
-                across(read(bottom, x.low), read(bottom, x.high), x.way),
-            ]
-        }
+    let axes = [Axis::new(valid.x, valid.width), Axis::new(valid.y, valid.height)];
+    let (eights, _) = out.as_chunks_mut::<LANES>();
+    for (i, out) in eights.iter_mut().enumerate() {
+        // SAFETY: this function runs on AVX2 alone, and the run is as long as `out`.
+        let [x, y] = unsafe { positions.eight(i * LANES) };
+        let (x, y) = (axes[0].between(x), axes[1].between(y));
+        let rows = match near_rows(plane, &x, &y) {
+            Some(rows) => rows,
+            None => far_rows(plane, &x, &y),
+        };
+        let pixels = down(rows, y.way);
+        // SAFETY: `out` holds 8 pixels of 32 bits, and the store needs no alignment.
+        unsafe { _mm256_storeu_si256(out.as_mut_ptr().cast(), pixels) };
+    }
+    eights.len() * LANES
+}
+
+/// Both rows interpolated to the right, wherever the positions lie. They are clamped to a
+/// rectangle that lies inside the plane, of which every pixel has a 32-bit index.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn far_rows(plane: &Plane<Rgba8>, x: &Between, y: &Between) -> [[__m256i; 2]; 2] {
+    let width = _mm256_set1_epi32(plane.width().cast_signed());
+    let row = |row: __m256i| {
+        let start = _mm256_mullo_epi32(row, width);
+        let read = |column: __m256i| {
+            let index = _mm256_add_epi32(start, column);
+            // SAFETY: the caller clamped to a rectangle inside the plane, so
+            // row * width + column is the index of a pixel of 4 bytes.
+            unsafe { _mm256_i32gather_epi32::<4>(plane.data().as_ptr().cast(), index) }
+        };
+        across(read(x.low), read(x.high), x.way)
     };
-    let pixels = down(rows, y.way);
-    // SAFETY: `out` holds 8 pixels of 32 bits, and the store needs no alignment.
-    unsafe { _mm256_storeu_si256(out.as_mut_ptr().cast(), pixels) };
+    [row(y.low), row(y.high)]
 }
 
 /// Both rows interpolated to the right, where all positions lie in one row and at most 7 pixels
@@ -104,6 +133,9 @@ fn near_rows(plane: &Plane<Rgba8>, x: &Between, y: &Between) -> Option<[[__m256i
         plane.data().get(start..)?.first_chunk::<{ LANES + 1 }>()
     };
     let (top, bottom) = (nine(row)?, nine(_mm256_cvtsi256_si32(y.high))?);
+    // Most often each pixel is read one to the right of the one before.
+    let uneven = _mm256_xor_si256(column, _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
+    let is_even = _mm256_testz_si256(uneven, uneven) != 0;
     let read = |nine: &[Rgba8; LANES + 1]| {
         // SAFETY: both loads are of 8 of the 9 pixels of 32 bits, and need no alignment.
         let (left, right) = unsafe {
@@ -112,6 +144,9 @@ fn near_rows(plane: &Plane<Rgba8>, x: &Between, y: &Between) -> Option<[[__m256i
                 _mm256_loadu_si256(nine.as_ptr().add(1).cast()),
             )
         };
+        if is_even {
+            return across(left, right, x.way);
+        }
         let pick = |pixels: __m256i| _mm256_permutevar8x32_epi32(pixels, column);
         across(pick(left), pick(right), x.way)
     };

@@ -50,8 +50,6 @@ impl DepthToKey {
     }
 
     /// The key of a stored value.
-    #[expect(clippy::cast_possible_truncation, reason = "float to int casts saturate, NaN is 0")]
-    #[expect(clippy::cast_sign_loss, reason = "float to int casts saturate")]
     #[inline(always)]
     pub(super) fn key(self, stored: f64) -> u32 {
         let fraction = match self {
@@ -59,8 +57,17 @@ impl DepthToKey {
             // A distance of 0 or behind the eye is as near as can be.
             Self::Linear { near } => near / stored.max(0.0) + stored * 0.0,
         };
-        (fraction * f64::from(u32::MAX)) as u32
+        whole(fraction * f64::from(u32::MAX))
     }
+}
+
+/// `value as u32`: rounded down, saturating, NaN is 0. Unlike the cast, AVX2 does it to several
+/// at once: adding 2^52 moves a whole number into the low bits of the mantissa.
+#[inline(always)]
+fn whole(value: f64) -> u32 {
+    const TWO_TO_52: f64 = 4_503_599_627_370_496.0;
+    let saturated = value.max(0.0).min(f64::from(u32::MAX)).floor();
+    ((saturated + TWO_TO_52).to_bits() & u64::from(u32::MAX)) as u32
 }
 
 /// Reads one stored value; integers are normalised to 0..1.
@@ -93,4 +100,25 @@ pub(super) fn clip_depth(
 #[inline(always)]
 fn bytes<const N: usize>(row: &[u8], x: usize) -> [u8; N] {
     row.as_chunks::<N>().0[x]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn whole_numbers_are_those_of_the_cast(value: f64, small in -10.0..5e9_f64) {
+            prop_assert_eq!(whole(value), value as u32);
+            prop_assert_eq!(whole(small), small as u32);
+        }
+    }
+
+    #[test]
+    fn no_number_is_nothing_and_too_large_ones_are_the_largest() {
+        for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -0.0, 4_294_967_295.5, 0.999] {
+            assert_eq!(whole(value), value as u32, "{value}");
+        }
+    }
 }

@@ -78,22 +78,18 @@ pub fn decode_key(
     let field = FieldInput::new(format, input, &planes, projection, key.valid, pool)?;
     key.field_offset = field.offset();
     key.motion_from = None;
-    key.velocity.resize(0, 0);
-    key.depth.resize(0, 0);
     if field.has_depth() {
         report.depth_contradiction = field.decode_depth(&mut scratch.columns, &mut key.depth);
+    } else {
+        key.depth.resize(0, 0);
     }
-    let Some(span) = planes.motion.and(input.motion_from).map(|from| input.content_time - from)
-    else {
+    let span = planes.motion.and(input.motion_from).map(|from| input.content_time - from);
+    report.lacks_camera_motion =
+        span.is_some() && !input.is_cut && lacks_camera_motion(format, input, &planes);
+    let Some(span) = span.filter(|_| !input.is_cut && !report.lacks_camera_motion) else {
+        key.velocity.resize(0, 0);
         return Ok(report);
     };
-    if input.is_cut {
-        return Ok(report);
-    }
-    if lacks_camera_motion(format, input, &planes) {
-        report.lacks_camera_motion = true;
-        return Ok(report);
-    }
     field.decode_motion(&mut scratch.columns, &mut scratch.displacement)?;
     let params = DilateParams { pixels_per_degree, span };
     dilate_motion(pool, &params, &key.depth, &scratch.displacement, &mut key.velocity);

@@ -1,7 +1,52 @@
 //! Reads a colour plane between its pixels.
 
+#[cfg(target_arch = "x86_64")]
+use std::arch::x86_64::__m256i;
+
 use crate::color::Texel;
 use crate::plane::{Plane, Rect};
+
+/// Where the pixels of a run are read, Q8 pixels, x and y.
+pub trait Positions {
+    /// Where pixel `i` is read.
+    fn at(&self, i: usize) -> [i32; 2];
+
+    /// Where pixels `i` to `i + 7` are read.
+    ///
+    /// # Safety
+    /// The processor has AVX2, and the run has 8 pixels from `i` on.
+    #[cfg(target_arch = "x86_64")]
+    unsafe fn eight(&self, i: usize) -> [__m256i; 2];
+}
+
+/// Positions that were computed before: x and y of each pixel.
+#[derive(Clone, Copy, Debug)]
+pub struct Listed<'a> {
+    /// To the right.
+    pub xs: &'a [i32],
+    /// Down; as many.
+    pub ys: &'a [i32],
+}
+
+impl Positions for Listed<'_> {
+    #[inline(always)]
+    fn at(&self, i: usize) -> [i32; 2] {
+        [self.xs[i], self.ys[i]]
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    unsafe fn eight(&self, i: usize) -> [__m256i; 2] {
+        use std::arch::x86_64::_mm256_loadu_si256;
+        let eight = |list: &[i32]| -> __m256i {
+            let eight: &[i32; 8] = list[i..].first_chunk().expect("the run has 8 pixels from i on");
+            // SAFETY: the caller has AVX2; 8 values of 32 bits are there, and the load needs no
+            // alignment.
+            unsafe { _mm256_loadu_si256(eight.as_ptr().cast()) }
+        };
+        [eight(self.xs), eight(self.ys)]
+    }
+}
 
 /// The colour at (`x`, `y`) in Q8 pixels, bilinear, clamped to the pixel centres of `valid`, which
 /// lies inside the plane.

@@ -9,7 +9,7 @@ use crate::key::{KeyFrame, Velocity};
 use crate::phase::Phase;
 use crate::plane::{Plane, Rect};
 use crate::warp::displacement;
-use crate::warp::sample::sample_run;
+use crate::warp::sample::{Listed, sample_run};
 
 /// Warps `key` to `phase` into `out`, which has the key's size and format. `map` is the map of
 /// the key's field grid; the key has a velocity field.
@@ -86,5 +86,5 @@ fn gather_block<T: Texel>(
         let [dx, dy] = displacement(velocities[usize::from(*cell) - first], field.phase);
         (*x, *y) = (p_x - dx, p_y - dy);
     }
-    T::sample_each(color, valid, xs, ys, texels);
+    T::sample_each(color, valid, &Listed { xs, ys }, texels);
 }

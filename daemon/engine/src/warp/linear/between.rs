@@ -6,7 +6,11 @@
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 
+#[cfg(target_arch = "x86_64")]
+use std::arch::x86_64::__m256i;
+
 use super::cpu::Frame;
+use crate::warp::sample::Positions;
 
 /// Pixels whose positions are computed before they are read.
 pub(super) const BLOCK: usize = 64;
@@ -21,8 +25,9 @@ pub(super) struct Between<'a> {
     above: &'a [[i16; 2]],
     below: &'a [[i16; 2]],
     way_y: i32,
-    /// The block's first pixel and the cell before it.
+    /// The block's first pixel, their number, and the cell before the first.
     first: u32,
+    pixels: usize,
     start: usize,
     /// Displacements of the block's cells and of the right neighbour of the last, interpolated
     /// down to the row, x and y; `count` of them hold.
@@ -41,6 +46,7 @@ impl<'a> Between<'a> {
             below: carried.row((y + 1).min(carried.height() - 1)),
             way_y: way.cast_signed(),
             first: 0,
+            pixels: 0,
             start: 0,
             cells: [[0; CELLS]; 2],
             count: 1,
@@ -62,7 +68,8 @@ impl<'a> Between<'a> {
             *x = lerp(shift(above[0]), shift(below[0]), way_y);
             *y = lerp(shift(above[1]), shift(below[1]), way_y);
         }
-        (self.first, self.start, self.count) = (first, start, end - start + 1);
+        (self.first, self.pixels, self.start) = (first, pixels, start);
+        self.count = end - start + 1;
         for cells in &mut self.cells {
             cells[self.count] = cells[self.count - 1];
         }
@@ -80,30 +87,44 @@ impl<'a> Between<'a> {
     }
 
     /// (1): where the pixels of the block are read, of which `p_y` is y and `p_x` that of the
-    /// first, Q8. In broken cells the result is not used. A wide step holds the cells of a grid
-    /// that is no finer than colour.
+    /// first, Q8. In broken cells the result is not used.
     #[inline(always)]
-    pub(super) fn positions(&self, [p_x, p_y]: [i32; 2], xs: &mut [i32], ys: &mut [i32]) {
-        let places = self.frame.map.x.before_each(self.first, xs.len());
-        let mut done = 0;
-        #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") && self.frame.map.x.cells() <= self.frame.map.x.pixels()
-        {
-            let (eights, (xs, _), (ys, _)) =
-                (places.as_chunks().0, xs.as_chunks_mut(), ys.as_chunks_mut());
-            for (places, (xs, ys)) in eights.iter().zip(xs.iter_mut().zip(ys)) {
-                let p_x = p_x + ((done as i32) << 8);
-                // SAFETY: the processor has AVX2, asked for just above.
-                unsafe { avx2::positions(&self.cells, self.start, places, [p_x, p_y], xs, ys) };
-                done += LANES;
-            }
+    pub(super) fn positions(&self, p: [i32; 2]) -> BlockPositions<'_> {
+        let map = &self.frame.map.x;
+        BlockPositions {
+            cells: &self.cells,
+            start: self.start,
+            places: map.before_each(self.first, self.pixels),
+            p,
         }
-        for (i, &[cell, way]) in places.iter().enumerate().skip(done) {
-            let cell = usize::from(cell) - self.start;
-            let [dx, dy] =
-                self.cells.map(|cells| lerp(cells[cell], cells[cell + 1], i32::from(way)));
-            (xs[i], ys[i]) = (p_x + ((i as i32) << 8) - dx, p_y - dy);
-        }
+    }
+}
+
+/// Where the pixels of a block are read.
+pub(super) struct BlockPositions<'a> {
+    /// Displacements of cells from number `start` on, x and y.
+    cells: &'a [[i32; CELLS]; 2],
+    start: usize,
+    /// For each pixel the cell before it and the way to the next one.
+    places: &'a [[u16; 2]],
+    /// The first pixel.
+    p: [i32; 2],
+}
+
+impl Positions for BlockPositions<'_> {
+    #[inline(always)]
+    fn at(&self, i: usize) -> [i32; 2] {
+        let [cell, way] = self.places[i];
+        let cell = usize::from(cell) - self.start;
+        let [dx, dy] = self.cells.map(|cells| lerp(cells[cell], cells[cell + 1], i32::from(way)));
+        [self.p[0] + ((i as i32) << 8) - dx, self.p[1] - dy]
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    unsafe fn eight(&self, i: usize) -> [__m256i; 2] {
+        // SAFETY: the caller has AVX2.
+        unsafe { avx2::positions(self, i) }
     }
 }
 

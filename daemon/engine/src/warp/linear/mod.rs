@@ -8,8 +8,9 @@
 //! ```text
 //! (1) smooth cell:  out(p) = key(p - d), d interpolated between the four cells around p
 //! (2) broken cell:  for each cell n of 3x3 around p: q = p - d(v_n), e = |d(near(q)) - d(v_n)|
-//!                   out(p) = key(q) of the nearest near(q) with e <= one cell, of the smallest e
-//!                   where depths are within 1/256 of each other
+//!                   of those with e <= one cell, the ones within 1/256 of the nearest near(q);
+//!                   of these the one of the smallest e, the first in reading order among equals;
+//!                   out(p) = key(q) of that one
 //! (3) no such n:    a hole. f = the far side. q = p - d(v_f), clamped to the valid rectangle
 //!                   out(p) = key(q) where near(q) is not nearer than f
 //! (4) else          out(p) = key's pixel where the pixel of f closest to p came from
@@ -25,13 +26,12 @@
 //! Phase 0 gives the key. Exactness: `Exact`.
 
 mod between;
+mod broken;
 mod cpu;
 mod fill;
-mod gpu;
 mod scratch;
 #[cfg(test)]
 mod tests;
 
-pub use cpu::{one_cell, warp_linear};
-pub use gpu::LINEAR;
+pub use cpu::warp_linear;
 pub use scratch::LinearScratch;

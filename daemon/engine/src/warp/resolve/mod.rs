@@ -12,10 +12,8 @@
 //! take part. Exactness: `Exact`.
 
 mod cpu;
-mod gpu;
 
-pub use cpu::{classify, resolve, smooth_limit};
-pub use gpu::{CLASSIFY, RESOLVE};
+pub use cpu::{classify, resolve};
 
 use crate::key::Velocity;
 

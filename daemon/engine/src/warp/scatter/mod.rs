@@ -17,16 +17,20 @@
 //!
 //! So fold-overs show the nearest surface, and of one surface the cell that lands closest. 25 bits
 //! number [`MAX_CELLS`] cells. [`NO_SOURCE`] marks a hole. Cells that land outside are dropped.
-//! Exactness: `Exact`. The CPU needs no atomics: a thread owns a band of target rows and visits
-//! the source rows that can reach it, so the result is the same for any number of threads.
+//! Exactness: `Exact`.
 
 mod cpu;
-mod gpu;
+mod runs;
+mod source;
 #[cfg(test)]
 mod tests;
 
-pub use cpu::{SourceField, phase_in_cells, scatter};
-pub use gpu::{SCATTER, SOURCE};
+pub use cpu::scatter as scatter_one_by_one;
+pub use runs::scatter;
+pub use source::SourceField;
+
+use crate::field::FieldAxis;
+use crate::phase::Phase;
 
 /// What a target cell holds that no source cell lands on.
 pub const NO_SOURCE: u32 = u32::MAX;
@@ -40,4 +44,17 @@ pub const MAX_CELLS: u32 = (1 << SOURCE_BITS) - 1;
 #[must_use]
 pub const fn source_of(splat: u32) -> usize {
     (splat & MAX_CELLS) as usize
+}
+
+/// `p_cell` of (1): the phase in the unit that turns velocities into Q8 cells.
+#[expect(clippy::cast_possible_wrap, reason = "at most the phase, 16384")]
+fn phase_in_cells(phase: Phase, axis: &FieldAxis) -> i32 {
+    let pixels = axis.pixels();
+    ((phase.q12().cast_unsigned() * axis.cells() + pixels / 2) / pixels) as i32
+}
+
+/// Displacement in Q8 cells of (1).
+#[inline(always)]
+fn shift(v: i16, scale: i32) -> i32 {
+    (i32::from(v) * scale + 256) >> 9
 }

@@ -65,6 +65,36 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    #[test]
+    fn runs_of_cells_are_splatted_like_cells_one_by_one(
+        (width, height) in (1_u32..700, 1_u32..6),
+        (shear, patch) in (0_i32..40, 1_u32..300),
+        levels in 1_u32..4,
+        seed: u32,
+        phase in 0.0..4.0,
+    ) {
+        // Patches that shear slowly, as a slanted ground does, and jump between each other.
+        let v = |x: u32, y: u32, axis| {
+            let jump = (hash(x / patch, y, seed.wrapping_add(axis)) % 512) as i32 - 256;
+            (jump + x as i32 * shear / 16) as i16
+        };
+        let depth = plane(width, height, |x, y| 100_000 + 300 * (hash(x / 3, y, seed) % levels));
+        let velocity = plane(width, height, |x, y| Velocity { x: v(x, y, 1), y: v(x, y, 2) / 8 });
+        let valid = Rect::full(width, height);
+        let key = KeyFrame { valid, depth, velocity, ..KeyFrame::default() };
+        let (pool, map, phase) = (pool(2), map_of(&key), Phase::from_f64(phase));
+        let mut source = SourceField::default();
+        source.update(&pool, &key);
+        let [mut top, mut splat, mut expected] = [(); 3].map(|()| Plane::default());
+        scatter_one_by_one(&source, &map, phase, &mut top, &mut expected);
+        scatter(&pool, &source, &map, phase, &mut top, &mut splat);
+        prop_assert_eq!(splat, expected);
+    }
+}
+
 #[test]
 fn a_cell_between_columns_reaches_both_and_one_on_a_column_reaches_one() {
     let velocity = plane(8, 1, |x, _| Velocity { x: if x == 2 { 48 } else { -3200 }, y: 0 });

@@ -7,26 +7,20 @@
 use std::arch::x86_64::{
     __m256i, _mm256_add_epi32, _mm256_and_si256, _mm256_loadu_si256, _mm256_mullo_epi32,
     _mm256_permutevar8x32_epi32, _mm256_set1_epi32, _mm256_setr_epi32, _mm256_srai_epi32,
-    _mm256_srli_epi32, _mm256_storeu_si256, _mm256_sub_epi32,
+    _mm256_srli_epi32, _mm256_sub_epi32,
 };
 
-use super::{CELLS, LANES};
+use super::{BlockPositions, CELLS, LANES};
 
-/// Where the pixels at `places` (cell and way) are read, the first of them at `p`, Q8. The
-/// displacements `cells` start with that of cell `start`.
+/// Where eight pixels from `i` on are read. Grids have at most as many cells as pixels.
 ///
 /// # Panics
-/// If a cell before a pixel is not among `cells`.
+/// If the block has fewer pixels.
 #[inline]
 #[target_feature(enable = "avx2")]
-pub(super) fn positions(
-    cells: &[[i32; CELLS]; 2],
-    start: usize,
-    places: &[[u16; 2]; LANES],
-    p: [i32; 2],
-    xs: &mut [i32; LANES],
-    ys: &mut [i32; LANES],
-) {
+pub(super) fn positions(block: &BlockPositions<'_>, i: usize) -> [__m256i; 2] {
+    let places: &[[u16; 2]; LANES] =
+        block.places[i..].first_chunk().expect("the block has 8 pixels from i on");
     let first = usize::from(places[0][0]);
     // SAFETY: `places` holds 8 times two values of 16 bits, and the load needs no alignment.
     let places = unsafe { _mm256_loadu_si256(places.as_ptr().cast()) };
@@ -34,8 +28,9 @@ pub(super) fn positions(
     let cell = _mm256_sub_epi32(cell, _mm256_set1_epi32(first as i32));
     let way = _mm256_srli_epi32(places, 16);
     let displacement = |cells: &[i32; CELLS]| {
-        let around: &[i32; LANES + 1] =
-            cells[first - start..].first_chunk().expect("cells reach a step beyond the block");
+        let around: &[i32; LANES + 1] = cells[first - block.start..]
+            .first_chunk()
+            .expect("cells reach a step beyond the block");
         // SAFETY: both loads are of 8 of the 9 values of 32 bits, and need no alignment.
         let (left, right) = unsafe {
             (
@@ -50,21 +45,16 @@ pub(super) fn positions(
         _mm256_add_epi32(left, part)
     };
     let steps = _mm256_setr_epi32(0, 0x100, 0x200, 0x300, 0x400, 0x500, 0x600, 0x700);
-    let x = _mm256_add_epi32(_mm256_set1_epi32(p[0]), steps);
-    store(xs, _mm256_sub_epi32(x, displacement(&cells[0])));
-    store(ys, _mm256_sub_epi32(_mm256_set1_epi32(p[1]), displacement(&cells[1])));
-}
-
-#[inline]
-#[target_feature(enable = "avx2")]
-fn store(to: &mut [i32; LANES], from: __m256i) {
-    // SAFETY: `to` holds 8 values of 32 bits, and the store needs no alignment.
-    unsafe { _mm256_storeu_si256(to.as_mut_ptr().cast(), from) };
+    let x = _mm256_add_epi32(_mm256_set1_epi32(block.p[0] + ((i as i32) << 8)), steps);
+    [
+        _mm256_sub_epi32(x, displacement(&block.cells[0])),
+        _mm256_sub_epi32(_mm256_set1_epi32(block.p[1]), displacement(&block.cells[1])),
+    ]
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::lerp;
+    use super::super::{BLOCK, Positions as _};
     use super::*;
     use crate::testing::hash;
 
@@ -78,22 +68,23 @@ mod tests {
                 |i: usize, axis| (hash(case, i as u32, axis) >> 11) as i32 - 0x10_0000;
             let cells = [0, 1].map(|axis| std::array::from_fn(|i| displacement(i, axis)));
             let (start, first) = (5, (hash(case, 0, 2) % 64) as usize);
-            let places: [[u16; 2]; LANES] = std::array::from_fn(|i| {
-                let cell = start + first + i * (case as usize % 8) / 7;
+            let places: [[u16; 2]; BLOCK] = std::array::from_fn(|i| {
+                let cell = start + (first + i * (case as usize % 8) / 7).min(BLOCK);
                 [cell as u16, (hash(case, i as u32, 3) & 0xff) as u16]
             });
-            let (mut xs, mut ys) = ([0; LANES], [0; LANES]);
-            // SAFETY: the processor has AVX2, asked for above.
-            unsafe { positions(&cells, start, &places, [700, -30], &mut xs, &mut ys) };
-            for (i, [cell, way]) in places.into_iter().enumerate() {
-                let cell = usize::from(cell) - start;
-                let [dx, dy] =
-                    cells.map(|cells| lerp(cells[cell], cells[cell + 1], i32::from(way)));
-                assert_eq!(
-                    [xs[i], ys[i]],
-                    [700 + 256 * i as i32 - dx, -30 - dy],
-                    "case {case}, {i}"
-                );
+            let block = BlockPositions { cells: &cells, start, places: &places, p: [700, -30] };
+            for i in 0..=BLOCK - LANES {
+                // SAFETY: the processor has AVX2, asked for above.
+                let together = unsafe { positions(&block, i) };
+                // SAFETY: 8 values of 32 bits are as large as a register.
+                let [xs, ys]: [[i32; LANES]; 2] = unsafe { std::mem::transmute(together) };
+                for lane in 0..LANES {
+                    assert_eq!(
+                        [xs[lane], ys[lane]],
+                        block.at(i + lane),
+                        "case {case}, {i}, {lane}"
+                    );
+                }
             }
         }
     }

@@ -1,0 +1,88 @@
+//! Keys of a scene in memory, as a client's slot holds them.
+
+use foreframe_engine::key::Camera;
+use foreframe_engine::{MonoTime, Rect, StreamFormat};
+use foreframe_fixtures::client::stream_options;
+use foreframe_fixtures::{Recipe, RenderedKey, Renderer, SceneInfo, Size};
+use foreframed::ingest;
+
+use crate::recording::{Frame, OwnedPlane};
+
+/// Rendered keys; the bench shows them over and over, under new times.
+const KEYS: u32 = 4;
+/// Time from key to key: 40 Hz.
+pub(super) const KEY_INTERVAL_S: f64 = 0.025;
+
+/// Some keys of one scene.
+#[derive(Debug)]
+pub(super) struct RenderedKeys {
+    /// What the stream declares.
+    pub(super) format: StreamFormat,
+    /// The keys, their times still to be filled in.
+    pub(super) keys: Vec<Frame>,
+}
+
+/// Bytes that a key and an in-between frame have to move at least.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct MovedBytes {
+    /// Planes of a key as they arrive.
+    pub key: usize,
+    /// Colour of a frame, which is read from the key and written to the output.
+    pub color: usize,
+    /// Depth key and velocity of every cell of the field grid, read by a frame.
+    pub field: usize,
+}
+
+impl RenderedKeys {
+    /// Renders them.
+    pub(super) fn render(info: &SceneInfo, size: Size, field_ratio: f64) -> Self {
+        let renderer = Renderer::new((info.build)());
+        let recipe =
+            Recipe { depth_ratio: field_ratio, motion_ratio: field_ratio, ..Recipe::new(size) };
+        let message = stream_options(&recipe).to_message(1);
+        let keys = (1..=KEYS).map(|index| {
+            let time = f64::from(index) * KEY_INTERVAL_S;
+            let key = RenderedKey::render(&renderer, &recipe, time, time - KEY_INTERVAL_S);
+            let (depth, motion) = (key.depth_bytes(), key.motion_bytes());
+            Frame {
+                index: u64::from(index),
+                content_time: MonoTime::from_ns(0),
+                motion_from: None,
+                is_cut: false,
+                color: plane(key.color.rgba, size, 4),
+                depth: Some(plane(depth, key.depth_size, 4)),
+                motion: Some(plane(motion, key.motion_size, 8)),
+                camera: Some(camera(&key.camera)),
+                motion_from_camera: Some(camera(&key.motion_from_camera)),
+            }
+        });
+        Self { format: ingest::stream_format(&message.format), keys: keys.collect() }
+    }
+
+    /// What one key, and one frame after it, have to move.
+    pub(super) fn bytes(&self) -> MovedBytes {
+        let Frame { color, depth, motion, .. } = &self.keys[0];
+        let fields = [depth, motion].map(|plane| plane.as_ref().map_or(0, |p| p.bytes.len()));
+        let cells = depth.as_ref().map_or(0, |plane| plane.width as usize * plane.height as usize);
+        MovedBytes {
+            key: color.bytes.len() + fields[0] + fields[1],
+            color: color.bytes.len(),
+            field: 8 * cells,
+        }
+    }
+}
+
+fn plane(bytes: Vec<u8>, size: Size, bytes_per_pixel: u32) -> OwnedPlane {
+    OwnedPlane {
+        bytes,
+        width: size.width,
+        height: size.height,
+        stride: size.width * bytes_per_pixel,
+        valid: Rect::full(size.width, size.height),
+        jitter: [0.0; 2],
+    }
+}
+
+fn camera(camera: &foreframe_fixtures::scene::Camera) -> Camera {
+    Camera { view: camera.view, projection: camera.projection }
+}
