@@ -265,6 +265,27 @@ fn blend_calls_a_copied_key_real_and_a_mean_synthesised() {
         let expected = if is_between { FrameKind::Synthesised } else { FrameKind::Real };
         assert_eq!(frame.kind, expected, "{frame:?}");
     }
+    let core = &rig.core;
+    let kind = |content_ms, previous: Option<i64>| {
+        let key = NewestKey {
+            index: 1,
+            content_time: at_ms(1_040),
+            previous_content_time: previous.map(at_ms),
+            moves: true,
+            taken: 2,
+        };
+        core.kind(at_ms(content_ms), Phase::ZERO, &key)
+    };
+    for (content_ms, expected) in [
+        (990, FrameKind::Real),
+        (1_000, FrameKind::Real),
+        (1_020, FrameKind::Synthesised),
+        (1_040, FrameKind::Real),
+        (1_050, FrameKind::Real),
+    ] {
+        assert_eq!(kind(content_ms, Some(1_000)), expected, "{content_ms} ms between two keys");
+        assert_eq!(kind(content_ms, None), FrameKind::Real, "{content_ms} ms, one key");
+    }
     // Alone, without a key before it, a key is copied whatever the content time.
     let mut rig = Rig::new(Method::Blend);
     rig.key(1_000);
