@@ -109,7 +109,7 @@ impl Client {
             .pool()
             .fd()
             .try_clone_to_owned()
-            .map_err(|source| ProtocolError::Os { action: "pass on shared memory", source })?;
+            .map_err(|reason| ProtocolError::Os { action: "pass on shared memory", reason })?;
         let pool = RegisterPool {
             stream: number,
             pool: number,

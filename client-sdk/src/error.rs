@@ -81,7 +81,7 @@ impl From<foreframe_protocol::Error> for Error {
 
 impl Error {
     pub(crate) fn os(action: &'static str) -> impl FnOnce(rustix::io::Errno) -> Self {
-        move |errno| Self::Protocol(foreframe_protocol::Error::Os { action, source: errno.into() })
+        move |errno| Self::Protocol(foreframe_protocol::Error::Os { action, reason: errno.into() })
     }
 }
 

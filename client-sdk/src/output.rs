@@ -138,10 +138,22 @@ impl OutputFrame {
     /// # Errors
     /// If the daemon described a frame that leaves its pool.
     pub fn copy_to_vec(&self, out: &mut Vec<u8>) -> Result<()> {
+        self.copy_rows_to_vec(0, 1, out)
+    }
+
+    /// As [`copy_to_vec`](Self::copy_to_vec), but only row `first` and every `step`-th after it,
+    /// for those who look at a sample. A `step` of 0 counts as 1.
+    ///
+    /// # Errors
+    /// If the daemon described a frame that leaves its pool.
+    pub fn copy_rows_to_vec(&self, first: u32, step: u32, out: &mut Vec<u8>) -> Result<()> {
         let OutputPool { width, height, stride, color, slot_bytes, .. } = self.pool.about;
-        let offset = u64::from(self.about.slot) * slot_bytes;
+        let rows = height.saturating_sub(first).div_ceil(step.max(1));
+        let offset = u64::from(self.about.slot) * slot_bytes
+            + u64::from(first.min(height)) * u64::from(stride);
+        let stride = stride.saturating_mul(step.max(1));
         let row_bytes = width * color.bytes_per_pixel();
-        Ok(self.pool.memory.copy_rows_to_vec(offset, stride, row_bytes, height, out)?)
+        Ok(self.pool.memory.copy_rows_to_vec(offset, stride, row_bytes, rows, out)?)
     }
 }
 

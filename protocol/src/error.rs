@@ -126,18 +126,20 @@ pub enum Error {
     #[error("the peer closed the connection")]
     Disconnected,
     /// The operating system refused.
-    #[error("{action}: {source}")]
+    // The reason is part of the text, because the text goes to peers, and so it is no source: a
+    // chain of errors would tell it twice.
+    #[error("{action}: {reason}")]
     Os {
         /// What was being done.
         action: &'static str,
         /// Why it was not.
-        source: io::Error,
+        reason: io::Error,
     },
 }
 
 impl Error {
     pub(crate) fn os(action: &'static str) -> impl FnOnce(rustix::io::Errno) -> Self {
-        move |errno| Self::Os { action, source: errno.into() }
+        move |errno| Self::Os { action, reason: errno.into() }
     }
 
     pub(crate) fn field(

@@ -1,5 +1,7 @@
 //! The real program: exit codes, what it says of wrong usage, and what is left when it is killed.
 
+#![allow(clippy::unwrap_used, reason = "a helper that cannot go on fails its test")]
+
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 

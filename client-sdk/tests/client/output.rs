@@ -80,6 +80,17 @@ fn a_frame_is_copied_without_padding_and_its_slot_goes_back() {
     output.copy_to_vec(&mut pixels).unwrap();
     let expected: Vec<u8> = (0..12).chain(16..28).collect();
     assert_eq!(pixels, expected);
+    for (first, step, rows) in [
+        (0, 2, 0..12),
+        (1, 2, 16..28),
+        (1, 1, 16..28),
+        (0, u32::MAX, 0..12),
+        (2, 1, 0..0),
+        (u32::MAX, 0, 0..0),
+    ] {
+        output.copy_rows_to_vec(first, step, &mut pixels).unwrap();
+        assert_eq!(pixels, rows.collect::<Vec<u8>>(), "from row {first} in steps of {step}");
+    }
 
     client.dispatch().unwrap();
     assert!(daemon.next().is_none(), "the frame is still held");

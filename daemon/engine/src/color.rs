@@ -10,6 +10,8 @@ mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod sse2;
 
+use zerocopy::{FromBytes, Immutable, IntoBytes};
+
 use crate::plane::{Plane, Rect};
 use crate::warp::sample::{Positions, sample};
 
@@ -37,17 +39,17 @@ impl ColorFormat {
 }
 
 /// One pixel of [`ColorFormat::Rgba8`]: red in the lowest byte.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, FromBytes, IntoBytes, Immutable)]
 #[repr(transparent)]
 pub struct Rgba8(pub u32);
 
 /// One pixel of [`ColorFormat::Rgb10a2`].
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, FromBytes, IntoBytes, Immutable)]
 #[repr(transparent)]
 pub struct Rgb10a2(pub u32);
 
 /// One pixel of [`ColorFormat::Rgba16f`], each channel as [`half_to_ordered`] maps it.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, FromBytes, IntoBytes, Immutable)]
 #[repr(transparent)]
 pub struct OrderedRgba16(pub [u16; 4]);
 
@@ -277,6 +279,25 @@ impl ColorPlane {
             (Self::Rgb10a2(to), Self::Rgb10a2(from)) => to.copy_from(from),
             (Self::Rgba16f(to), Self::Rgba16f(from)) => to.copy_from(from),
             (to, from) => *to = from.clone(),
+        }
+    }
+
+    /// The pixels in canonical form, as they lie in memory.
+    #[must_use]
+    pub fn as_bytes(&self) -> &[u8] {
+        match self {
+            Self::Rgba8(plane) => plane.data().as_bytes(),
+            Self::Rgb10a2(plane) => plane.data().as_bytes(),
+            Self::Rgba16f(plane) => plane.data().as_bytes(),
+        }
+    }
+
+    /// The pixels in canonical form, as they lie in memory.
+    pub fn as_mut_bytes(&mut self) -> &mut [u8] {
+        match self {
+            Self::Rgba8(plane) => plane.data_mut().as_mut_bytes(),
+            Self::Rgb10a2(plane) => plane.data_mut().as_mut_bytes(),
+            Self::Rgba16f(plane) => plane.data_mut().as_mut_bytes(),
         }
     }
 

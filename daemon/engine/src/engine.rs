@@ -8,8 +8,9 @@ use std::sync::Arc;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use crate::backend::FrameInput;
-use crate::backend::cpu::CpuBackend;
+use crate::backend::fallback::Backend;
+use crate::backend::gpu::Gpu;
+use crate::backend::{BackendStatus, FrameInput};
 use crate::color::ColorPlane;
 use crate::decode::{DecodeError, DecodeScratch, decode_key};
 use crate::field::FieldMap;
@@ -82,7 +83,7 @@ pub struct Engine {
     /// A key frame that is no longer needed, whose buffers the next one takes over.
     spare: KeyFrame,
     scratch: Scratch,
-    cpu: CpuBackend,
+    backend: Backend,
 }
 
 /// Buffers of the steps, kept from frame to frame.
@@ -104,8 +105,20 @@ impl Engine {
             previous: None,
             spare: KeyFrame::default(),
             scratch: Scratch::default(),
-            cpu: CpuBackend::default(),
+            backend: Backend::default(),
         }
+    }
+
+    /// Makes pictures on `gpu` instead of the CPU, as long as it works. To be called before the
+    /// first key. [`Engine::backend`] says how it went.
+    pub fn use_gpu(&mut self, gpu: &Arc<Gpu>) {
+        self.backend.use_gpu(gpu, self.format.color, self.config.method);
+    }
+
+    /// What makes the pictures, and why it is not what was asked for.
+    #[must_use]
+    pub fn backend(&self) -> &BackendStatus {
+        self.backend.status()
     }
 
     /// What the stream declared.
@@ -152,7 +165,7 @@ impl Engine {
             let cells = [key.velocity.width(), key.velocity.height()];
             self.scratch.map.update(key.valid, cells, key.field_offset);
         }
-        self.cpu.take_key(&self.pool, self.config.method, &key);
+        self.backend.take_key(&self.pool, self.config.method, &key, &self.scratch.map);
         let newest = self.newest.replace(key);
         let dropped = std::mem::replace(&mut self.previous, newest);
         self.spare = dropped.unwrap_or_default();
@@ -199,7 +212,7 @@ impl Engine {
             let method = self.config.method;
             let map = &self.scratch.map;
             let frame = FrameInput { method, phase, newest: key, previous, map };
-            self.cpu.make(&self.pool, &frame, out);
+            self.backend.make(&self.pool, &frame, out);
         }
         Some(FrameReport { key_index: key.index, phase, work: (self.config.timer)() - started_at })
     }

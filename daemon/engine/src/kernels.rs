@@ -1,7 +1,16 @@
 //! The kernels of the pipeline, in the order in which a key and then an in-between frame meet them.
 //!
-//! Tests that hold for every kernel loop over [`KERNELS`]: the names are unique, and each kernel
-//! has its folder.
+//! [`KERNELS`] says for each where it lives, what runs it on the CPU, which shader does, and how
+//! close the two have to come. The GPU backend takes its steps from this table, and tests that hold
+//! for every kernel loop over it.
+
+use crate::backend::shader::Shader;
+use crate::fill::far_side::FAR_SIDE;
+use crate::warp::blend::BLEND;
+use crate::warp::gather::GATHER;
+use crate::warp::linear::LINEAR;
+use crate::warp::resolve::{CLASSIFY, RESOLVE};
+use crate::warp::scatter::{SCATTER, SOURCE};
 
 /// How close two implementations of a kernel have to come.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -15,45 +24,30 @@ pub enum Exactness {
 pub struct Kernel {
     /// Its folder, below `src`.
     pub folder: &'static str,
-    /// The function of its `cpu.rs` that runs it over whole planes.
+    /// The function that runs it over whole planes on the CPU.
     pub cpu: &'static str,
+    /// The same in WGSL; None where the kernel runs on the CPU whatever the backend.
+    pub shader: Option<&'static Shader>,
     /// How close another implementation has to come to it.
     pub exactness: Exactness,
 }
 
-const fn exact(folder: &'static str, cpu: &'static str) -> Kernel {
-    Kernel { folder, cpu, exactness: Exactness::Exact }
+const fn exact(folder: &'static str, cpu: &'static str, shader: Option<&'static Shader>) -> Kernel {
+    Kernel { folder, cpu, shader, exactness: Exactness::Exact }
 }
 
 /// Every kernel, in order. A method uses those of its own name and what it names.
 pub const KERNELS: &[Kernel] = &[
-    exact("trajectory/dilate_motion", "dilate_motion"),
-    exact("warp/blend", "blend"),
-    exact("warp/gather", "warp_gather"),
-    exact("warp/scatter", "scatter"),
-    exact("warp/resolve", "resolve"),
-    exact("fill/far_side", "far_side"),
-    exact("warp/resolve", "classify"),
-    exact("warp/linear", "warp_linear"),
+    exact("trajectory/dilate_motion", "dilate_motion", None),
+    exact("warp/blend", "blend", Some(&BLEND)),
+    exact("warp/gather", "warp_gather", Some(&GATHER)),
+    exact("warp/scatter", "update", Some(&SOURCE)),
+    exact("warp/scatter", "scatter", Some(&SCATTER)),
+    exact("warp/resolve", "resolve", Some(&RESOLVE)),
+    exact("fill/far_side", "far_side", Some(&FAR_SIDE)),
+    exact("warp/resolve", "classify", Some(&CLASSIFY)),
+    exact("warp/linear", "warp_linear", Some(&LINEAR)),
 ];
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use std::collections::BTreeSet;
-    use std::fs;
-    use std::path::Path;
-
-    #[test]
-    fn every_kernel_is_where_the_table_says_and_no_name_comes_twice() {
-        let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-        let mut names = BTreeSet::new();
-        for kernel in KERNELS {
-            let cpu = fs::read_to_string(src.join(kernel.folder).join("cpu.rs")).unwrap();
-            assert!(cpu.contains(&format!("pub fn {}(", kernel.cpu)), "{kernel:?}");
-            let header = fs::read_to_string(src.join(kernel.folder).join("mod.rs")).unwrap();
-            assert!(header.contains("Exactness:"), "{kernel:?} declares no exactness");
-            assert!(names.insert(kernel.cpu), "{kernel:?} comes twice");
-        }
-    }
-}
+mod tests;

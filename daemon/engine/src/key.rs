@@ -1,5 +1,7 @@
 //! Key frames: as they arrive ([`KeyInput`]) and as the engine keeps them ([`KeyFrame`]).
 
+use zerocopy::{Immutable, IntoBytes};
+
 use crate::color::ColorPlane;
 use crate::plane::{Plane, Rect};
 use crate::time::{MonoSpan, MonoTime};
@@ -57,7 +59,7 @@ pub struct KeyInput<'a> {
 
 /// Velocity of one surface point, in 1/32 pixel of the colour plane per motion span: position at
 /// the key minus position at `motion_from`. [`Velocity::UNTRACKABLE`] holds no velocity.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, IntoBytes, Immutable)]
 #[repr(C)]
 pub struct Velocity {
     /// To the right.

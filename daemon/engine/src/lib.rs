@@ -23,6 +23,7 @@ pub mod kernels;
 pub mod key;
 pub mod method;
 pub mod pacing;
+pub mod params;
 pub mod phase;
 pub mod plane;
 mod simd;

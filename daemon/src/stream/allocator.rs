@@ -82,7 +82,7 @@ fn allocate(request: &PoolRequest) -> AllocatedPool {
     let made = Outlet::allocate(session, stream, pool, slots, format).and_then(|made| {
         let (outlet, memory, message) = made;
         let fd = memory.fd().try_clone_to_owned();
-        let fd = fd.map_err(|source| Error::Os { action: "copy a descriptor", source })?;
+        let fd = fd.map_err(|reason| Error::Os { action: "copy a descriptor", reason })?;
         Ok((outlet, message, fd))
     });
     AllocatedPool { session, stream, pool, made }

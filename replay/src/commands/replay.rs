@@ -77,6 +77,7 @@ struct Replayed {
     method: &'static str,
     keys: usize,
     refused: usize,
+    superseded: u64,
     dropped: u64,
     frames: Vec<ReplayedFrame>,
 }
@@ -154,6 +155,7 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
         method: args.method.name(),
         keys: plan.keys.len(),
         refused: losses.refused.len(),
+        superseded: losses.superseded,
         dropped: losses.dropped,
         frames,
     };
@@ -191,11 +193,11 @@ impl Replayed {
                 "{present_ms:10.3} {content_ms:15.3} {key:6} {phase:6.3}  {kind:<12} {digest}"
             );
         }
-        let Self { digest, method, keys, refused, dropped, .. } = self;
+        let Self { digest, method, keys, refused, superseded, dropped, .. } = self;
         let _infallible = writeln!(
             text,
-            "{} output frames of {method} from {keys} keys ({refused} refused), {dropped} \
-             dropped\n{digest}",
+            "{} output frames of {method} from {keys} keys ({refused} refused, {superseded} \
+             superseded), {dropped} dropped\n{digest}",
             self.frames.len()
         );
         text

@@ -70,7 +70,7 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
         scores.push(score);
     }
     progress.finish_and_clear();
-    let report = Report::new("cpu", options.threads.get(), scores);
+    let report = Report::new(options.threads.get(), scores);
     output.result(&report, &report.to_text())
 }
 

@@ -31,6 +31,8 @@ pub struct Submissions {
     pub work: Vec<MonoSpan>,
     /// The newest counts of the daemon: in the end, those of the whole show.
     pub statistics: Option<Statistics>,
+    /// Where the daemon makes frames, in its own words.
+    pub backend: String,
     /// The last counts of the first second.
     pub settled: Option<Statistics>,
 }
@@ -63,7 +65,8 @@ impl Application {
     /// If the daemon goes away or finds fault with something.
     pub fn play(mut self, rehearsal: &Rehearsal, bar: &ProgressBar) -> anyhow::Result<Submissions> {
         let mut demo = DemoClient::new(self.stream, &rehearsal.keys, self.base.as_ns());
-        let mut done = Submissions::default();
+        let backend = self.client.welcome().gpu_name.clone();
+        let mut done = Submissions { backend, ..Submissions::default() };
         let mut next = Next::At(self.base.as_ns());
         while let Next::At(due_ns) = next {
             clock::sleep_until(MonoTime::from_ns(due_ns));

@@ -16,7 +16,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use anyhow::{Context as _, anyhow};
+use anyhow::anyhow;
 use foreframe_client::ConnectOptions;
 use foreframe_engine::{Method, MonoSpan};
 use foreframe_fixtures::{SceneInfo, Size};
@@ -60,8 +60,7 @@ pub struct Settings {
 /// # Errors
 /// If the daemon cannot be started, a client is refused, or a picture cannot be written.
 pub fn run(settings: &Settings, output: &Output) -> anyhow::Result<Summary> {
-    std::fs::create_dir_all(&settings.out)
-        .with_context(|| format!("making {}", settings.out.display()))?;
+    summary::prepare(&settings.out)?;
     let rehearsal = Rehearsal::render(settings, output);
     let daemon = DaemonProcess::start(settings)?;
     let base = clock::now() + HEAD_START;
@@ -81,7 +80,7 @@ pub fn run(settings: &Settings, output: &Output) -> anyhow::Result<Summary> {
     })?;
     show.finish_and_clear();
     daemon.stop()?;
-    let summary = Summary::new(settings, &rehearsal, &submissions, &shown);
+    let mut summary = Summary::new(settings, &rehearsal, &submissions, &shown);
     summary.write(settings, &rehearsal, &submissions, &shown)?;
     Ok(summary)
 }

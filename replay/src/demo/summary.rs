@@ -1,7 +1,8 @@
 //! What happened, in numbers ([`Summary`]), in ten lines ([`Summary::text`]), and in pictures.
 
 use std::fs;
-use std::path::PathBuf;
+use std::io;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use foreframe_client::OutputKind;
@@ -10,13 +11,36 @@ use serde::Serialize;
 
 use super::Settings;
 use super::application::Submissions;
-use super::audience::{Kept, Seen, Shown, psnr_rgb_db};
+use super::audience::{Kept, ROW_STEP, Seen, Shown, psnr_rgb_db};
 use super::rehearsal::Rehearsal;
 use crate::draw::Rgba8Image;
 use crate::pictures::{ContactSheetRow, PresentKind, TimelineEvent, contact_sheet, timeline};
 
 /// Part of the show that the timeline draws: 0.4 s from the second third on.
 const TIMELINE_SPAN: MonoSpan = MonoSpan::from_ms(400);
+
+const CONTACT_SHEET: &str = "contact-sheet.png";
+const TIMELINE: &str = "timeline.png";
+const NUMBERS: &str = "summary.json";
+
+/// Makes the folder, and removes what an earlier demo left in it: nobody shall take its pictures
+/// for those of this one.
+///
+/// # Errors
+/// If the folder cannot be made or a file in it not removed.
+pub fn prepare(out: &Path) -> anyhow::Result<()> {
+    fs::create_dir_all(out).with_context(|| format!("making {}", out.display()))?;
+    for name in [CONTACT_SHEET, TIMELINE, NUMBERS] {
+        let path = out.join(name);
+        match fs::remove_file(&path) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                return Err(error).with_context(|| format!("removing {}", path.display()));
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
 
 /// The demo's result. Times in milliseconds are medians unless their name says otherwise.
 #[derive(Serialize, Clone, PartialEq, Debug)]
@@ -39,22 +63,22 @@ pub struct Summary {
     pub dropped_after_first_second: u64,
     /// Share of planned in-between frames that were dropped after the first second, percent.
     pub dropped_percent: f64,
-    /// Standard deviation of the content-time step over the refresh interval.
-    pub content_judder: f64,
-    /// Mean over the in-between frames whose truth was rendered.
-    pub psnr_rgb_db: f64,
+    /// Standard deviation of the content-time step over the refresh interval. None without steps.
+    pub content_judder: Option<f64>,
+    /// Mean over the in-between frames whose truth was rendered. None where there are none.
+    pub psnr_rgb_db: Option<f64>,
     /// The worst of them.
-    pub psnr_rgb_min_db: f64,
-    /// In-between frames that were compared.
+    pub psnr_rgb_min_db: Option<f64>,
+    /// In-between frames that were compared, by one row in [`ROW_STEP`] each.
     pub compared: u64,
-    /// Real frames that were compared and differ from their key.
+    /// Real frames that differ from their key in the rows that were compared, as above.
     pub real_frames_changed: u64,
-    /// Time to fill a slot and submit it.
-    pub fill_and_submit_ms: f64,
-    /// Time to make an in-between frame, mean of the daemon.
-    pub synthesis_ms: f64,
-    /// Where the engine ran.
-    pub backend: &'static str,
+    /// Time to fill a slot and submit it. None without keys.
+    pub fill_and_submit_ms: Option<f64>,
+    /// Time to make an in-between frame, mean of the daemon. None where it made none.
+    pub synthesis_ms: Option<f64>,
+    /// Where the engine ran, as the daemon said.
+    pub backend: String,
     /// How in-between frames were made.
     pub method: &'static str,
     /// The scene.
@@ -69,6 +93,8 @@ pub struct Summary {
     pub refresh_hz: f64,
     /// Where the pictures are.
     pub out: PathBuf,
+    /// Pictures that were written there: without in-between frames there is nothing to draw.
+    pub pictures: Vec<&'static str>,
 }
 
 impl Summary {
@@ -101,12 +127,13 @@ impl Summary {
             dropped_percent: 100.0 * ratio(dropped, planned),
             content_judder: content_judder(&seen.frames, settings.refresh_hz),
             psnr_rgb_db: mean(&compared),
-            psnr_rgb_min_db: compared.iter().copied().fold(f64::INFINITY, f64::min).min(100.0),
+            psnr_rgb_min_db: compared.iter().copied().min_by(f64::total_cmp),
             compared: compared.len() as u64,
             real_frames_changed: changed_real_frames(seen),
             fill_and_submit_ms: median_ms(&submissions.work),
-            synthesis_ms: count(|counts| counts.synthesis_mean_ns) as f64 / 1e6,
-            backend: "cpu",
+            synthesis_ms: (count(|counts| counts.synthesised + counts.dropped) > 0)
+                .then(|| count(|counts| counts.synthesis_mean_ns) as f64 / 1e6),
+            backend: submissions.backend.clone(),
             method: settings.method.name(),
             scene: settings.scene.name,
             width: settings.size.width,
@@ -114,6 +141,7 @@ impl Summary {
             key_rate_hz: settings.key_rate_hz,
             refresh_hz: settings.refresh_hz,
             out: settings.out.clone(),
+            pictures: Vec::new(),
         }
     }
 
@@ -122,6 +150,11 @@ impl Summary {
     pub fn text(&self) -> String {
         let Self { key_frames, presented, real, synthesised, repeated, dropped, .. } = self;
         let out = self.out.display();
+        let pictures: Vec<_> = self.pictures.iter().map(|name| format!("{out}/{name}")).collect();
+        let pictures = match pictures.is_empty() {
+            true => "nothing: no picture was shown".to_owned(),
+            false => pictures.join(" and "),
+        };
         [
             format!(
                 "`{}` at {} Hz went to a daemon in a second process and came out at {} Hz, {}x{}.",
@@ -133,39 +166,42 @@ impl Summary {
                 "frames dropped      {dropped}; after the first second {} ({:.2} % of the in-betweens)",
                 self.dropped_after_first_second, self.dropped_percent
             ),
-            format!("content judder      {:.4} of a refresh interval", self.content_judder),
+            format!("content judder      {}", or_none(self.content_judder, 4, " of a refresh interval")),
             format!(
-                "error               {:.1} dB PSNR on average, {:.1} dB at worst, {} of {} in-betweens compared",
-                self.psnr_rgb_db, self.psnr_rgb_min_db, self.compared, self.synthesised
+                "error               {} PSNR on average, {} at worst, {} of {} in-betweens compared, 1 row in {ROW_STEP}",
+                or_none(self.psnr_rgb_db, 1, " dB"),
+                or_none(self.psnr_rgb_min_db, 1, " dB"),
+                self.compared,
+                self.synthesised
             ),
             format!("real frames changed {}", self.real_frames_changed),
             format!(
-                "time                {:.2} ms to fill and submit a key, {:.2} ms to make an in-between on the {}",
-                self.fill_and_submit_ms, self.synthesis_ms, self.backend
+                "time                {} to fill and submit a key, {} to make an in-between on {}",
+                or_none(self.fill_and_submit_ms, 2, " ms"),
+                or_none(self.synthesis_ms, 2, " ms"),
+                self.backend
             ),
-            format!("look at             {out}/contact-sheet.png and {out}/timeline.png"),
-            format!("numbers             {out}/summary.json"),
+            format!("look at             {pictures}"),
+            format!("numbers             {out}/{NUMBERS}"),
         ]
         .join("\n")
     }
 
-    /// Writes the contact sheet, the timeline and the numbers.
+    /// Writes the contact sheet, the timeline and the numbers, and notes which there are.
     ///
     /// # Errors
     /// If one cannot be drawn or written.
     pub fn write(
-        &self,
+        &mut self,
         settings: &Settings,
         rehearsal: &Rehearsal,
         submissions: &Submissions,
         seen: &Seen,
     ) -> anyhow::Result<()> {
         let out = &settings.out;
-        let json = serde_json::to_string_pretty(self)?;
-        let path = out.join("summary.json");
-        fs::write(&path, json + "\n").with_context(|| format!("writing {}", path.display()))?;
         if let Some(sheet) = self.draw_contact_sheet(rehearsal, &seen.kept)? {
-            save(&sheet, &out.join("contact-sheet.png"))?;
+            save(&sheet, &out.join(CONTACT_SHEET))?;
+            self.pictures.push(CONTACT_SHEET);
         }
         let events = events(submissions, seen, rehearsal);
         if !events.is_empty() {
@@ -173,9 +209,12 @@ impl Summary {
                 "{} at {} Hz to {} Hz, {}",
                 self.scene, self.key_rate_hz, self.refresh_hz, self.method
             );
-            save(&timeline(&title, &events)?, &out.join("timeline.png"))?;
+            save(&timeline(&title, &events)?, &out.join(TIMELINE))?;
+            self.pictures.push(TIMELINE);
         }
-        Ok(())
+        let json = serde_json::to_string_pretty(self)?;
+        let path = out.join(NUMBERS);
+        fs::write(&path, json + "\n").with_context(|| format!("writing {}", path.display()))
     }
 
     fn draw_contact_sheet(
@@ -191,7 +230,7 @@ impl Summary {
             let key = rehearsal.keys.get(usize::try_from(shown.key_index).ok()?)?;
             Some(ContactSheetRow {
                 label: format!("key {}, phase {:.2}", shown.key_index, shown.phase),
-                detail: format!("{:.1} dB", psnr_rgb_db(&kept.rgba, &without_alpha(truth), 1)),
+                detail: format!("{:.1} dB", psnr_rgb_db(&kept.rgba, &without_alpha(truth))),
                 key: image(&key.color.rgba)?,
                 in_between: image(&kept.rgba)?,
                 truth: image(truth)?,
@@ -206,7 +245,7 @@ impl Summary {
     }
 }
 
-fn save(picture: &tiny_skia::Pixmap, path: &std::path::Path) -> anyhow::Result<()> {
+fn save(picture: &tiny_skia::Pixmap, path: &Path) -> anyhow::Result<()> {
     picture.save_png(path).with_context(|| format!("writing {}", path.display()))
 }
 
@@ -225,7 +264,7 @@ fn compared(seen: &Seen, rehearsal: &Rehearsal) -> Vec<f64> {
     }
     let against_truth = |kept: &Kept| {
         let truth = rehearsal.render_truth(kept.shown.content_ns);
-        psnr_rgb_db(&kept.rgba, &without_alpha(&truth), 1)
+        psnr_rgb_db(&kept.rgba, &without_alpha(&truth))
     };
     seen.kept.iter().map(against_truth).collect()
 }
@@ -240,7 +279,7 @@ fn changed_real_frames(seen: &Seen) -> u64 {
 /// Standard deviation of the content-time step from one refresh to the next, over the refresh
 /// interval. A refresh without a new picture shows the last one again: a step of 0. Pictures that
 /// were shown but not received leave the steps around them out.
-fn content_judder(frames: &[Shown], refresh_hz: f64) -> f64 {
+fn content_judder(frames: &[Shown], refresh_hz: f64) -> Option<f64> {
     let mut steps = Vec::new();
     for pair in frames.windows(2) {
         let refreshes = (pair[1].present_at - pair[0].present_at).as_secs_f64() * refresh_hz;
@@ -251,9 +290,9 @@ fn content_judder(frames: &[Shown], refresh_hz: f64) -> f64 {
             steps.push(step);
         }
     }
-    let centre = mean(&steps);
+    let centre = mean(&steps)?;
     let squares: Vec<f64> = steps.iter().map(|step| (step - centre) * (step - centre)).collect();
-    mean(&squares).sqrt()
+    mean(&squares).map(f64::sqrt)
 }
 
 fn events(submissions: &Submissions, seen: &Seen, rehearsal: &Rehearsal) -> Vec<TimelineEvent> {
@@ -286,18 +325,24 @@ fn events(submissions: &Submissions, seen: &Seen, rehearsal: &Rehearsal) -> Vec<
     keys.chain(presents).collect()
 }
 
-fn mean(values: &[f64]) -> f64 {
-    if values.is_empty() { 0.0 } else { values.iter().sum::<f64>() / values.len() as f64 }
+/// None of nothing.
+fn mean(values: &[f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}
+
+/// A number with its unit, for people.
+fn or_none(value: Option<f64>, digits: usize, unit: &str) -> String {
+    value.map_or_else(|| "none".to_owned(), |value| format!("{value:.digits$}{unit}"))
 }
 
 fn ratio(part: u64, whole: u64) -> f64 {
     if whole == 0 { 0.0 } else { part as f64 / whole as f64 }
 }
 
-fn median_ms(spans: &[MonoSpan]) -> f64 {
+fn median_ms(spans: &[MonoSpan]) -> Option<f64> {
     let mut sorted = spans.to_vec();
     sorted.sort_unstable();
-    sorted.get(sorted.len() / 2).map_or(0.0, |span| span.as_ms_f64())
+    sorted.get(sorted.len() / 2).map(|span| span.as_ms_f64())
 }
 
 #[cfg(test)]
@@ -319,14 +364,53 @@ mod tests {
         frames.iter().map(frame).collect()
     }
 
+    fn settings(out: &Path) -> Settings {
+        Settings {
+            scene: foreframe_fixtures::SceneInfo::by_name("static").unwrap(),
+            size: foreframe_fixtures::Size::new(32, 18),
+            seconds: 0.1,
+            key_rate_hz: 40.0,
+            refresh_hz: 120.0,
+            method: foreframe_engine::Method::Linear,
+            sink: "shm".to_owned(),
+            out: out.to_owned(),
+        }
+    }
+
+    #[test]
+    fn a_show_of_which_nothing_was_seen_has_no_numbers_and_no_old_pictures() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in [CONTACT_SHEET, TIMELINE, NUMBERS, "mine.txt"] {
+            fs::write(folder.path().join(name), "old").unwrap();
+        }
+        let settings = settings(folder.path());
+        prepare(&settings.out).unwrap();
+        let rehearsal = Rehearsal::render(&settings, &crate::output::Output::new(true));
+        let (submissions, seen) = (Submissions::default(), Seen::default());
+        let mut summary = Summary::new(&settings, &rehearsal, &submissions, &seen);
+        summary.write(&settings, &rehearsal, &submissions, &seen).unwrap();
+        let names = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name());
+        let mut names: Vec<_> = names.collect();
+        names.sort();
+        assert_eq!(names, ["mine.txt", NUMBERS]);
+        let json = fs::read_to_string(folder.path().join(NUMBERS)).unwrap();
+        let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+        for number in ["psnr_rgb_db", "psnr_rgb_min_db", "content_judder", "synthesis_ms"] {
+            assert!(json[number].is_null(), "{number}: {}", json[number]);
+        }
+        let text = summary.text();
+        assert!(text.contains("none PSNR") && !text.contains(".png"), "{text}");
+    }
+
     #[test]
     fn even_steps_have_no_judder() {
-        assert!(content_judder(&shown(&[(0, 0), (1, 10), (2, 20), (3, 30)]), 100.0) < 1e-9);
+        let judder = content_judder(&shown(&[(0, 0), (1, 10), (2, 20), (3, 30)]), 100.0);
+        assert!(judder.unwrap() < 1e-9);
     }
 
     #[test]
     fn a_refresh_that_repeats_a_picture_is_judder() {
-        let judder = content_judder(&shown(&[(0, 0), (1, 10), (3, 30), (4, 40)]), 100.0);
+        let judder = content_judder(&shown(&[(0, 0), (1, 10), (3, 30), (4, 40)]), 100.0).unwrap();
         let expected = (0.5_f64).sqrt();
         assert!((judder - expected).abs() < 1e-9, "steps 1, 0, 2, 1: found {judder}");
     }
@@ -336,6 +420,6 @@ mod tests {
         let mut frames = shown(&[(0, 0), (1, 10), (3, 30), (4, 40)]);
         frames[2].not_received = 1;
         frames[3].not_received = 1;
-        assert!(content_judder(&frames, 100.0) < 1e-9);
+        assert!(content_judder(&frames, 100.0).unwrap() < 1e-9);
     }
 }

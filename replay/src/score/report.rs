@@ -10,7 +10,7 @@ use super::metrics::TileClasses;
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Report {
     /// What the engine ran on.
-    pub backend: &'static str,
+    pub backend: String,
     /// Threads of the engine.
     pub threads: usize,
     /// One entry per capture, in the order given.
@@ -24,6 +24,9 @@ pub struct Report {
 pub struct CaptureScore {
     /// Name of what was recorded.
     pub name: String,
+    /// What the engines ran on, as they say. Told once, for all captures.
+    #[serde(skip)]
+    pub backend: String,
     /// Columns of the colour plane.
     pub width: u32,
     /// Rows of the colour plane.
@@ -73,7 +76,7 @@ pub struct MethodScore {
     /// The worst tile of all frames.
     pub worst_tile_psnr_db: Option<f64>,
     /// The tiles of all frames by class.
-    pub tile_classes_percent: TileClasses,
+    pub tile_classes_percent: Option<TileClasses>,
     /// See [`super::metrics::error_flicker`].
     pub error_flicker: Option<f64>,
     /// Work of the engine per in-between frame.
@@ -108,7 +111,12 @@ pub struct MeanScore {
 impl Report {
     /// Adds the means to the captures' scores. Every capture has the same methods.
     #[must_use]
-    pub fn new(backend: &'static str, threads: usize, captures: Vec<CaptureScore>) -> Self {
+    pub fn new(threads: usize, captures: Vec<CaptureScore>) -> Self {
+        // One that gave up its GPU on the way says so here.
+        let mut backends: Vec<_> =
+            captures.iter().map(|capture| capture.backend.as_str()).collect();
+        backends.dedup();
+        let backend = backends.join(", then ");
         let methods = captures.first().map_or(0, |capture| capture.methods.len());
         let mean = (0..methods)
             .map(|method| mean_score(captures.iter().map(|capture| &capture.methods[method])))
@@ -249,7 +257,7 @@ mod tests {
             ssim: Some(0.95),
             flip: Some(0.04),
             worst_tile_psnr_db: psnr,
-            tile_classes_percent: TileClasses::default(),
+            tile_classes_percent: Some(TileClasses::default()),
             error_flicker: Some(0.8),
             ms_per_frame: Some(3.1),
             ms_per_key: Some(2.4),
@@ -259,6 +267,7 @@ mod tests {
     fn capture(psnr: Option<f64>) -> CaptureScore {
         CaptureScore {
             name: "atrium".into(),
+            backend: "cpu".to_owned(),
             width: 640,
             height: 360,
             ratio: 3,
@@ -276,8 +285,16 @@ mod tests {
     }
 
     #[test]
+    fn the_backend_is_what_the_engines_say_each_named_once() {
+        let on = |backend: &str| CaptureScore { backend: backend.to_owned(), ..capture(None) };
+        let report = |names: &[&str]| Report::new(1, names.iter().map(|it| on(it)).collect());
+        assert_eq!(report(&["cpu", "cpu"]).backend, "cpu");
+        assert_eq!(report(&["gpu:a", "cpu"]).backend, "gpu:a, then cpu");
+    }
+
+    #[test]
     fn the_fixed_json_names_are_there() {
-        let report = Report::new("cpu", 2, vec![capture(Some(33.0))]);
+        let report = Report::new(2, vec![capture(Some(33.0))]);
         let json = serde_json::to_value(&report).unwrap();
         let first = &json["captures"][0];
         for name in ["name", "width", "height", "ratio", "keys", "methods"] {
@@ -309,14 +326,14 @@ mod tests {
     #[test]
     fn the_mean_is_over_captures_that_have_a_value_and_the_worst_tile_is_the_worst() {
         let captures = vec![capture(Some(30.0)), capture(Some(20.0)), capture(None)];
-        let mean = &Report::new("cpu", 2, captures).mean[0];
+        let mean = &Report::new(2, captures).mean[0];
         assert_eq!(mean.psnr_y_db, Some(25.0));
         assert_eq!(mean.worst_tile_psnr_db, Some(20.0));
     }
 
     #[test]
     fn a_value_that_does_not_exist_is_null_and_a_dash() {
-        let report = Report::new("cpu", 2, vec![capture(None)]);
+        let report = Report::new(2, vec![capture(None)]);
         let json = serde_json::to_value(&report).unwrap();
         assert!(json["captures"][0]["methods"][0]["psnr_rgb_db"].is_null());
         assert!(report.to_text().contains(" - "));
@@ -324,7 +341,7 @@ mod tests {
 
     #[test]
     fn header_and_rows_of_the_table_end_in_the_same_columns() {
-        let text = Report::new("cpu", 2, vec![capture(Some(33.25)), capture(Some(1.5))]).to_text();
+        let text = Report::new(2, vec![capture(Some(33.25)), capture(Some(1.5))]).to_text();
         let lines: Vec<_> = text.lines().collect();
         let header = lines.iter().position(|line| line.contains("method")).unwrap();
         for title in ["frames", "RGB", "SSIM", "flicker", "ms/key"] {
@@ -333,7 +350,7 @@ mod tests {
             assert!(row[end - 1] != b' ' && row[end] == b' ', "{title}: {text}");
         }
         assert!(text.contains("mean of 2 captures"));
-        let alone = Report::new("cpu", 2, vec![capture(Some(1.0))]).to_text();
+        let alone = Report::new(2, vec![capture(Some(1.0))]).to_text();
         assert!(!alone.contains("mean of"), "one capture has no mean row");
     }
 }

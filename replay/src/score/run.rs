@@ -88,6 +88,7 @@ pub fn score_recording(
     }
     Ok(CaptureScore {
         name: name.to_owned(),
+        backend: runs.first().map(|run| run.engine.backend().name.clone()).unwrap_or_default(),
         width: format.width,
         height: format.height,
         ratio: options.ratio.get(),

@@ -64,6 +64,8 @@ pub struct OutputFrame {
 pub struct Losses {
     /// Pictures that were not ready for their refresh.
     pub dropped: u64,
+    /// Keys that a newer one replaced before they were taken in.
+    pub superseded: u64,
     /// Why each refused key was refused, in order.
     pub refused: Vec<String>,
 }
@@ -97,34 +99,37 @@ pub fn replay(
     let mut last_arrivals = [clock; 2];
     loop {
         let plan = stream.core.plan(clock);
-        if let Some(key) =
-            next.take_if(|key| plan.content_time.is_none() || key.arrives_at <= plan.wake_at)
-        {
+        let is_taken = |key: &mut TimedKey| {
+            plan.content_time.is_none() || (!stream.owes_picture && key.arrives_at <= plan.wake_at)
+        };
+        if let Some(mut key) = next.take_if(is_taken) {
             clock = clock.max(key.arrives_at);
-            last_arrivals = [last_arrivals[1], key.arrives_at];
-            if let Err(error) = stream.core.on_key(&key.frame.as_input(), || key.arrives_at) {
-                losses.refused.push(format!("key {}: {error}", key.frame.index));
-            }
             next = keys.next().transpose()?;
+            // Newest wins, as in the daemon: what came meanwhile replaces what waited.
+            while let Some(newer) = next.take_if(|newer| newer.arrives_at <= clock) {
+                losses.superseded += 1;
+                key = newer;
+                next = keys.next().transpose()?;
+            }
+            last_arrivals = [last_arrivals[1], key.arrives_at];
+            match stream.core.on_key(&key.frame.as_input(), || clock) {
+                Ok(_) => stream.owes_picture = true,
+                Err(error) => losses.refused.push(format!("key {}: {error}", key.frame.index)),
+            }
             continue;
         }
         let interval = (last_arrivals[1] - last_arrivals[0]).max(config.refresh_interval);
-        let is_over = next.is_none() && plan.present_at > last_arrivals[1] + interval;
+        let has_shown_all = next.is_none() && !stream.owes_picture;
+        let is_over = has_shown_all && plan.present_at > last_arrivals[1] + interval;
         if plan.content_time.is_none() || (is_over && stream.shown.is_some()) {
             return Ok(losses);
         }
         clock = plan.wake_at + stream.work;
-        match stream.core.make(&plan, || clock) {
-            Some(FrameOutcome::Presented(frame)) => {
-                let frame = stream.present(&frame);
-                show(&frame, stream.core.frame())?;
-            }
-            Some(FrameOutcome::Repeated) => {
-                if let Some(frame) = stream.repeat(plan.present_at) {
-                    show(&frame, stream.core.frame())?;
-                }
-            }
-            Some(FrameOutcome::Dropped(_)) | None => losses.dropped += 1,
+        stream.owes_picture = false;
+        let outcome = stream.core.make(&plan, || clock);
+        match outcome.and_then(|outcome| stream.on_outcome(outcome, plan.present_at)) {
+            Some(frame) => show(&frame, &stream.picture)?,
+            None => losses.dropped += 1,
         }
     }
 }
@@ -135,6 +140,11 @@ struct VirtualStream {
     work: MonoSpan,
     refresh_interval: MonoSpan,
     shown: Option<OutputFrame>,
+    /// The picture on the display. What was made and dropped is not.
+    picture: ColorPlane,
+    /// Whether no picture was made since the newest key: between two keys there is always one, as
+    /// in the daemon.
+    owes_picture: bool,
 }
 
 impl VirtualStream {
@@ -155,7 +165,20 @@ impl VirtualStream {
             },
         );
         let work = MAX_WORK.min(refresh_interval.scale(1, 4));
-        Self { core, work, refresh_interval, shown: None }
+        let picture = ColorPlane::default();
+        Self { core, work, refresh_interval, shown: None, picture, owes_picture: false }
+    }
+
+    /// What the refresh at `present_at` shows after `outcome`; None if its picture was dropped.
+    fn on_outcome(&mut self, outcome: FrameOutcome, present_at: MonoTime) -> Option<OutputFrame> {
+        match outcome {
+            FrameOutcome::Presented(frame) => {
+                std::mem::swap(self.core.frame(), &mut self.picture);
+                Some(self.present(&frame))
+            }
+            FrameOutcome::Repeated => self.repeat(present_at),
+            FrameOutcome::Dropped(_) => None,
+        }
     }
 
     fn present(&mut self, frame: &PresentedFrame) -> OutputFrame {

@@ -209,3 +209,58 @@ fn one_key_alone_is_shown() {
         []
     );
 }
+
+#[test]
+fn what_is_repeated_is_the_picture_that_was_shown_and_not_one_that_was_dropped() {
+    let mut recording = recording();
+    let plan = Plan::new(&recording.heads, count(4));
+    let reader = KeyReader::new(recording.format(), &plan).unwrap();
+    let config = ReplayConfig {
+        method: Method::Hold,
+        threads: count(1),
+        refresh_interval: MonoSpan::from_hz(100.0),
+        pixels_per_degree: None,
+    };
+    let keys = timed_keys(&mut recording, &reader, &plan, KeyTiming::Stepped);
+    let keys: Vec<_> = keys.map(Result::unwrap).take(2).collect();
+    let mut stream = VirtualStream::new(*reader.format(), &config, keys[0].arrives_at);
+    let mut now = keys[0].arrives_at;
+    let mut make = |stream: &mut VirtualStream, key: &TimedKey, late: MonoSpan| {
+        stream.core.on_key(&key.frame.as_input(), || key.arrives_at).unwrap();
+        now = now.max(key.arrives_at);
+        let plan = stream.core.plan(now);
+        let ready_at = plan.wake_at + late;
+        let outcome = stream.core.make(&plan, || ready_at).unwrap();
+        now = ready_at;
+        (stream.on_outcome(outcome, plan.present_at), plan.present_at)
+    };
+    let (shown, _) = make(&mut stream, &keys[0], MonoSpan::ZERO);
+    assert_eq!(shown.unwrap().kind, OutputKind::Real);
+    let first = stream.picture.clone();
+    let (dropped, present_at) = make(&mut stream, &keys[1], MonoSpan::from_ms(100));
+    assert_eq!(dropped, None);
+    assert_ne!(*stream.core.frame(), first, "the dropped picture is another one");
+    let repeated = stream.on_outcome(FrameOutcome::Repeated, present_at).unwrap();
+    assert_eq!((repeated.kind, repeated.key), (OutputKind::Repeated, 0));
+    assert_eq!(stream.picture, first);
+}
+
+#[test]
+fn keys_that_outrun_the_display_are_superseded_and_each_one_taken_in_is_shown() {
+    // A key every 8.3 ms of the recording, on a display of 40 Hz.
+    let mut recording = recording();
+    let plan = Plan::new(&recording.heads, count(1));
+    let timing = KeyTiming::AsRecorded;
+    let shown = replayed_plan(&mut recording, &plan, Method::Hold, 1, 40.0, timing);
+    assert!(shown.losses.superseded > 10, "{:?}", shown.losses);
+    assert_eq!(shown.losses.dropped, 0);
+    let mut keys: Vec<_> = shown.frames.iter().map(|(frame, _)| frame.key).collect();
+    keys.dedup();
+    assert_eq!(keys.len() as u64 + shown.losses.superseded, plan.keys.len() as u64);
+    // The display never falls behind: a shown key came in within the last two refreshes, to the
+    // rounding of times in the recording.
+    for (frame, _) in shown.frames.iter().filter(|(frame, _)| frame.kind == OutputKind::Real) {
+        let age = frame.present_at - recording.heads[frame.key as usize].arrived_at;
+        assert!(age < MonoSpan::from_us(50_100), "{age} at key {}", frame.key);
+    }
+}

@@ -6,7 +6,14 @@
 //!
 //! A picture that is a key as it is needs no backend: the engine copies it.
 
+pub mod choice;
 pub mod cpu;
+pub(crate) mod fallback;
+#[cfg_attr(not(feature = "gpu"), path = "no_gpu.rs")]
+pub mod gpu;
+pub mod shader;
+
+pub use fallback::BackendStatus;
 
 use crate::field::FieldMap;
 use crate::key::KeyFrame;

@@ -108,3 +108,84 @@ fn content_time_that_does_not_advance_is_refused_and_the_keys_stay() {
     push(&mut engine, 101, 7).unwrap();
     assert_ne!(frame(&mut engine, 100), before);
 }
+
+#[cfg(feature = "gpu")]
+mod on_gpus {
+    use super::*;
+    use crate::backend::gpu::test_adapters::test_gpus;
+
+    const MOVING: [Method; 3] = [Method::Blend, Method::Gather, Method::Linear];
+
+    /// What two engines show over three keys, two frames each, the second one after `event` was
+    /// told of each step.
+    fn shown(engine: &mut Engine, mut event: impl FnMut(usize)) -> Vec<Vec<u8>> {
+        let mut frames = Vec::new();
+        for (step, at_ms) in [100, 125, 150].into_iter().enumerate() {
+            push(engine, at_ms, at_ms as u8).unwrap();
+            for (half, after_ms) in [-10, 7].into_iter().enumerate() {
+                event(2 * step + half);
+                frames.push(frame(engine, at_ms + after_ms));
+            }
+        }
+        frames
+    }
+
+    #[test]
+    fn a_stream_on_a_gpu_shows_what_one_on_the_cpu_does() {
+        for gpu in test_gpus("a_stream_on_a_gpu_shows_what_one_on_the_cpu_does") {
+            for method in MOVING {
+                let mut on_gpu = engine(method);
+                on_gpu.use_gpu(&gpu);
+                let frames = shown(&mut on_gpu, |_| ());
+                assert_eq!(frames, shown(&mut engine(method), |_| ()), "{method}");
+                let expected =
+                    BackendStatus { name: format!("gpu:{}", gpu.name()), fell_back: None };
+                assert_eq!(on_gpu.backend(), &expected, "{method}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_stream_whose_gpu_is_lost_goes_on_with_the_same_pictures() {
+        for step in 0..6 {
+            for method in MOVING {
+                for gpu in test_gpus("a_stream_whose_gpu_is_lost_goes_on_with_the_same_pictures") {
+                    let mut on_gpu = engine(method);
+                    on_gpu.use_gpu(&gpu);
+                    let frames = shown(&mut on_gpu, |now| {
+                        if now == step {
+                            gpu.lose();
+                        }
+                    });
+                    assert_eq!(
+                        frames,
+                        shown(&mut engine(method), |_| ()),
+                        "{method}, lost at step {step} on {}",
+                        gpu.name()
+                    );
+                    // A method may have nothing to do on the device after it was lost.
+                    if step < 4 {
+                        let status = on_gpu.backend();
+                        assert_eq!(status.name, "cpu", "{method}, step {step}");
+                        let why = status.fell_back.as_deref().unwrap();
+                        assert!(why.contains("lost"), "{why}");
+                        assert!(gpu.is_lost(), "{method}, step {step}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_stream_that_starts_on_a_lost_gpu_runs_on_the_cpu() {
+        for gpu in test_gpus("a_stream_that_starts_on_a_lost_gpu_runs_on_the_cpu") {
+            gpu.lose();
+            let mut on_gpu = engine(Method::Linear);
+            on_gpu.use_gpu(&gpu);
+            let frames = shown(&mut on_gpu, |_| ());
+            assert_eq!(frames, shown(&mut engine(Method::Linear), |_| ()));
+            assert_eq!(on_gpu.backend().name, "cpu");
+            assert!(on_gpu.backend().fell_back.is_some());
+        }
+    }
+}

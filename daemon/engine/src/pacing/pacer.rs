@@ -34,7 +34,8 @@ pub struct PacerConfig {
 pub struct Plan {
     /// When to start to make the picture.
     pub wake_at: MonoTime,
-    /// When it has to be handed to the display at the latest.
+    /// When it has to be handed to the display at the latest, for displays that need it some time
+    /// before. One that only counts its refreshes takes a picture until `present_at`.
     pub submit_by: MonoTime,
     /// When the display starts to show it.
     pub present_at: MonoTime,
@@ -89,7 +90,8 @@ pub struct PacerStatus {
 /// Call [`plan`](Self::plan) after every event and wait until `wake_at` or the next event,
 /// whichever comes first. At `wake_at`, [`start`](Self::start) the plan, make the picture, tell
 /// [`on_work`](Self::on_work), and hand it over, or drop it ([`on_dropped`](Self::on_dropped)) if
-/// `submit_by` has passed. Tell [`on_presented`](Self::on_presented) when feedback comes.
+/// it comes too late for the display: after `submit_by`, or on a timer display after `present_at`.
+/// Tell [`on_presented`](Self::on_presented) when feedback comes.
 #[derive(Clone, Debug)]
 pub struct Pacer {
     interpolates: bool,

@@ -77,17 +77,17 @@ impl TileTally {
 
     /// The share of each class; all 0 where no tile was counted.
     #[must_use]
-    pub fn classes_percent(&self) -> TileClasses {
+    pub fn classes_percent(&self) -> Option<TileClasses> {
         let total: u64 = self.counts.iter().sum();
-        let percent = |class: usize| self.counts[class] as f64 * 100.0 / total.max(1) as f64;
-        TileClasses {
+        let percent = |class: usize| self.counts[class] as f64 * 100.0 / total as f64;
+        (total > 0).then(|| TileClasses {
             verybad: percent(0),
             bad: percent(1),
             quitegood: percent(2),
             good: percent(3),
             verygood: percent(4),
             excellent: percent(5),
-        }
+        })
     }
 
     /// The lowest value of all tiles in dB, 0 to 50; None where no tile was counted.
@@ -111,7 +111,7 @@ mod tests {
     use super::*;
 
     fn shares(tally: &TileTally) -> [f64; 6] {
-        let c = tally.classes_percent();
+        let c = tally.classes_percent().unwrap();
         [c.verybad, c.bad, c.quitegood, c.good, c.verygood, c.excellent]
     }
 
@@ -159,9 +159,9 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_tally_has_no_worst_tile() {
+    fn an_empty_tally_has_no_worst_tile_and_no_shares() {
         assert_eq!(TileTally::default().worst_db(), None);
-        assert_eq!(shares(&TileTally::default()), [0.0; 6]);
+        assert_eq!(TileTally::default().classes_percent(), None);
     }
 
     proptest! {

@@ -2,13 +2,10 @@
 
 use rayon::ThreadPool;
 
-use super::NO_CELL;
+use super::{NO_CELL, NO_ROW};
 use crate::bands::for_each_row;
 use crate::plane::Plane;
 use crate::warp::scatter::{NO_SOURCE, SourceField, source_of};
-
-/// No resolved row on this side.
-const NO_ROW: u16 = u16::MAX;
 
 /// Buffers of the search.
 #[derive(Clone, Debug, Default)]

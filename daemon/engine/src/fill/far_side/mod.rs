@@ -16,10 +16,14 @@
 //! Exactness: `Exact`.
 
 mod cpu;
+mod gpu;
 #[cfg(test)]
 mod tests;
 
 pub use cpu::{FarScratch, far_side};
+pub use gpu::FAR_SIDE;
 
 /// No cell at all.
 pub const NO_CELL: u32 = u32::MAX;
+/// No resolved row on this side.
+pub const NO_ROW: u16 = u16::MAX;

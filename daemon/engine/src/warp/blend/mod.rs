@@ -9,5 +9,7 @@
 //! the key after the content time. Exactness: `Exact`.
 
 mod cpu;
+mod gpu;
 
 pub use cpu::blend;
+pub use gpu::BLEND;

@@ -12,5 +12,7 @@
 //! motion field the key is held. Exactness: `Exact`.
 
 mod cpu;
+mod gpu;
 
 pub use cpu::warp_gather;
+pub use gpu::GATHER;

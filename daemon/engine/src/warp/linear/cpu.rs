@@ -25,20 +25,20 @@ pub fn warp_linear(
     out: &mut ColorPlane,
 ) {
     scratch.resolve(pool, map, phase);
-    let cell_px = map.x.pixels().div_ceil(map.x.cells()) + map.y.pixels().div_ceil(map.y.cells());
-    let frame = Frame {
-        field: scratch,
-        map,
-        valid: key.valid,
-        phase,
-        one_cell: (cell_px << 7).cast_signed(),
-    };
+    let frame = Frame { field: scratch, map, valid: key.valid, phase, one_cell: one_cell(map) };
     match (&key.color, out) {
         (ColorPlane::Rgba8(color), ColorPlane::Rgba8(out)) => gather(pool, &frame, color, out),
         (ColorPlane::Rgb10a2(color), ColorPlane::Rgb10a2(out)) => gather(pool, &frame, color, out),
         (ColorPlane::Rgba16f(color), ColorPlane::Rgba16f(out)) => gather(pool, &frame, color, out),
         _ => unreachable!("the engine gives the output the format of the key"),
     }
+}
+
+/// Mean of a cell's width and height, Q8 pixels.
+#[must_use]
+pub fn one_cell(map: &FieldMap) -> i32 {
+    let cell_px = map.x.pixels().div_ceil(map.x.cells()) + map.y.pixels().div_ceil(map.y.cells());
+    (cell_px << 7).cast_signed()
 }
 
 /// Everything that a pixel reads beside colour.

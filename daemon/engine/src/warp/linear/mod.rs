@@ -29,9 +29,11 @@ mod between;
 mod broken;
 mod cpu;
 mod fill;
+mod gpu;
 mod scratch;
 #[cfg(test)]
 mod tests;
 
-pub use cpu::warp_linear;
+pub use cpu::{one_cell, warp_linear};
+pub use gpu::LINEAR;
 pub use scratch::LinearScratch;

@@ -34,6 +34,13 @@ pub fn resolve(
     );
 }
 
+/// The largest range of velocities of (2): `(range p) >> 9 <= SMOOTH_RANGE` up to it.
+#[must_use]
+pub fn smooth_limit(phase: Phase) -> u16 {
+    let limit = (((SMOOTH_RANGE + 1) << 9) - 1) / phase.q12().max(1);
+    u16::try_from(limit).unwrap_or(u16::MAX)
+}
+
 /// (2).
 pub fn classify(
     pool: &ThreadPool,
@@ -43,9 +50,7 @@ pub fn classify(
 ) {
     let (width, height) = (carried.width(), carried.height());
     class.resize(width, height);
-    // ((range p) >> 9 <= SMOOTH_RANGE) for every range up to this one.
-    let limit = (((SMOOTH_RANGE + 1) << 9) - 1) / phase.q12().max(1);
-    let limit = u16::try_from(limit).unwrap_or(u16::MAX);
+    let limit = smooth_limit(phase);
     for_each_row(
         pool,
         class,

@@ -12,8 +12,10 @@
 //! take part. Exactness: `Exact`.
 
 mod cpu;
+mod gpu;
 
-pub use cpu::{classify, resolve};
+pub use cpu::{classify, resolve, smooth_limit};
+pub use gpu::{CLASSIFY, RESOLVE};
 
 use crate::key::Velocity;
 

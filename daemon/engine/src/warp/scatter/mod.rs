@@ -20,12 +20,14 @@
 //! Exactness: `Exact`.
 
 mod cpu;
+mod gpu;
 mod runs;
 mod source;
 #[cfg(test)]
 mod tests;
 
 pub use cpu::scatter as scatter_one_by_one;
+pub use gpu::{SCATTER, SOURCE};
 pub use runs::scatter;
 pub use source::SourceField;
 
@@ -48,7 +50,8 @@ pub const fn source_of(splat: u32) -> usize {
 
 /// `p_cell` of (1): the phase in the unit that turns velocities into Q8 cells.
 #[expect(clippy::cast_possible_wrap, reason = "at most the phase, 16384")]
-fn phase_in_cells(phase: Phase, axis: &FieldAxis) -> i32 {
+#[must_use]
+pub fn phase_in_cells(phase: Phase, axis: &FieldAxis) -> i32 {
     let pixels = axis.pixels();
     ((phase.q12().cast_unsigned() * axis.cells() + pixels / 2) / pixels) as i32
 }

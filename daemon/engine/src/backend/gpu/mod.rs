@@ -1,0 +1,250 @@
+//! The GPU backend: the kernels of [`crate::kernels`] as WGSL on a wgpu device.
+//!
+//! A key's planes go up once, from the engine's private copy, the field before colour: the device
+//! derives what the scatter reads while the CPU still copies colour. Nothing waits for an upload; it
+//! runs on the device while the engine goes on. A frame is one submission: its dispatches, and a
+//! copy to memory that the CPU reads. Buffers are kept from key to key; they grow and never shrink.
+//!
+//! Every picture is the same, byte for byte, as the CPU's. Whatever a driver does ends in a
+//! [`GpuError`], never in a panic; what then happens is up to [`super::fallback`].
+
+pub mod adapters;
+mod device;
+mod error;
+mod planes;
+pub mod test_adapters;
+mod transfer;
+
+use std::sync::Arc;
+
+use zerocopy::IntoBytes;
+
+pub use adapters::{GpuAdapter, adapters};
+pub use device::Gpu;
+pub use error::GpuError;
+
+use super::FrameInput;
+use super::shader::{Extent, Shader, Slot};
+use crate::color::{ColorFormat, ColorPlane};
+use crate::field::FieldMap;
+use crate::fill::far_side::FAR_SIDE;
+use crate::key::KeyFrame;
+use crate::method::Method;
+use crate::params::{FrameParams, map_words};
+use crate::phase::Phase;
+use crate::warp::blend::BLEND;
+use crate::warp::gather::GATHER;
+use crate::warp::linear::LINEAR;
+use crate::warp::resolve::{CLASSIFY, RESOLVE};
+use crate::warp::scatter::{SCATTER, SOURCE};
+use device::Compiled;
+use planes::Planes;
+use transfer::{Download, Upload};
+
+/// The shaders that run once per key.
+fn key_shaders(method: Method) -> &'static [&'static Shader] {
+    match method {
+        Method::Linear => &[&SOURCE],
+        Method::Hold | Method::Blend | Method::Gather | Method::Grid => &[],
+    }
+}
+
+/// The shaders that make a frame, in order.
+fn frame_shaders(method: Method) -> &'static [&'static Shader] {
+    match method {
+        Method::Hold => &[],
+        Method::Blend => &[&BLEND],
+        Method::Gather => &[&GATHER],
+        Method::Grid => &[],
+        Method::Linear => &[&SCATTER, &RESOLVE, &FAR_SIDE, &CLASSIFY, &LINEAR],
+    }
+}
+
+/// A shader of a method, ready to run.
+type Step = (&'static Shader, Arc<Compiled>);
+
+/// What one stream keeps on a device.
+#[derive(Debug)]
+pub(crate) struct GpuBackend {
+    gpu: Arc<Gpu>,
+    method: Method,
+    key_steps: Vec<Step>,
+    frame_steps: Vec<Step>,
+    planes: Planes,
+    field_upload: [Upload; 3],
+    color_upload: Upload,
+    download: Download,
+    /// The field map as the shaders read it.
+    tables: Vec<u32>,
+}
+
+impl GpuBackend {
+    /// For a stream of `format` and `method`. Compiles what it needs.
+    ///
+    /// # Errors
+    /// If the device is gone or takes a shader not.
+    pub(crate) fn new(
+        gpu: &Arc<Gpu>,
+        format: ColorFormat,
+        method: Method,
+    ) -> Result<Self, GpuError> {
+        if method == Method::Grid {
+            return Err(GpuError::Refused { why: "no shader makes `grid`".to_owned() });
+        }
+        let steps = |shaders: &[&'static Shader]| -> Result<Vec<Step>, GpuError> {
+            shaders.iter().map(|shader| Ok((*shader, gpu.shader(shader, format)?))).collect()
+        };
+        Ok(Self {
+            gpu: Arc::clone(gpu),
+            method,
+            key_steps: steps(key_shaders(method))?,
+            frame_steps: steps(frame_shaders(method))?,
+            planes: Planes::default(),
+            field_upload: Default::default(),
+            color_upload: Upload::default(),
+            download: Download::default(),
+            tables: Vec::new(),
+        })
+    }
+
+    /// Sends `key` up. Returns before it is there.
+    ///
+    /// # Errors
+    /// If the device is gone, or the key too large for it.
+    pub(crate) fn take_key(&mut self, key: &KeyFrame, map: &FieldMap) -> Result<(), GpuError> {
+        let moves = !key.velocity.data().is_empty();
+        if self.method == Method::Hold || (self.method != Method::Blend && !moves) {
+            return Ok(());
+        }
+        let gpu = Arc::clone(&self.gpu);
+        gpu.guard(|| {
+            if self.method == Method::Blend {
+                self.planes.swap(Slot::Color, Slot::Older);
+            } else {
+                self.send_field(key, map)?;
+            }
+            self.send_color(key)
+        })
+    }
+
+    fn send_field(&mut self, key: &KeyFrame, map: &FieldMap) -> Result<(), GpuError> {
+        map_words(map, &mut self.tables);
+        let gpu = Arc::clone(&self.gpu);
+        let mut commands = gpu.device.create_command_encoder(&Default::default());
+        // A binding cannot be empty: without depth it is one word that no shader reads.
+        let depth = key.depth.data().as_bytes();
+        let depth = if depth.is_empty() { &[0; 4] } else { depth };
+        let parts = [
+            (Slot::Velocity, key.velocity.data().as_bytes()),
+            (Slot::Depth, depth),
+            (Slot::Tables, self.tables.as_bytes()),
+        ];
+        for (upload, (slot, bytes)) in self.field_upload.iter_mut().zip(parts) {
+            let target = self.planes.sized(&gpu, slot, bytes.len() as u64)?;
+            upload.write(&gpu, &mut commands, bytes, target)?;
+        }
+        let params = FrameParams::new(key, map, Phase::ZERO);
+        self.make_room(&params)?;
+        self.planes.write_params(&gpu, &params)?;
+        dispatch(&gpu, &mut commands, &self.key_steps, &mut self.planes, &params)?;
+        let submission = gpu.queue.submit([commands.finish()]);
+        for upload in &mut self.field_upload {
+            upload.submitted(&submission);
+        }
+        Ok(())
+    }
+
+    fn send_color(&mut self, key: &KeyFrame) -> Result<(), GpuError> {
+        let gpu = Arc::clone(&self.gpu);
+        let mut commands = gpu.device.create_command_encoder(&Default::default());
+        let bytes = key.color.as_bytes();
+        let target = self.planes.sized(&gpu, Slot::Color, bytes.len() as u64)?;
+        self.color_upload.write(&gpu, &mut commands, bytes, target)?;
+        let submission = gpu.queue.submit([commands.finish()]);
+        self.color_upload.submitted(&submission);
+        Ok(())
+    }
+
+    /// Gives every plane on the field grid that the steps bind its size.
+    fn make_room(&mut self, params: &FrameParams) -> Result<(), GpuError> {
+        let cells = u64::from(params.cells[0]) * u64::from(params.cells[1]);
+        for (shader, _) in self.key_steps.iter().chain(&self.frame_steps) {
+            for slot in shader.bindings.iter().map(|binding| binding.slot()) {
+                match slot {
+                    Slot::Holes => self.planes.sized(&self.gpu, slot, 4)?,
+                    Slot::Held
+                    | Slot::Near
+                    | Slot::Top
+                    | Slot::Splat
+                    | Slot::Carried
+                    | Slot::Origin
+                    | Slot::StackedRows
+                    | Slot::BesideColumns
+                    | Slot::Broken => self.planes.sized(&self.gpu, slot, 4 * cells)?,
+                    Slot::Color
+                    | Slot::Older
+                    | Slot::Velocity
+                    | Slot::Depth
+                    | Slot::Tables
+                    | Slot::Out => continue,
+                };
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes a picture into `out`, which has the size and format of the keys; they have been taken.
+    ///
+    /// # Errors
+    /// If the device is gone, refuses, or does not answer; `out` is then unspecified.
+    pub(crate) fn make(
+        &mut self,
+        frame: &FrameInput<'_>,
+        out: &mut ColorPlane,
+    ) -> Result<(), GpuError> {
+        let gpu = Arc::clone(&self.gpu);
+        gpu.guard(|| {
+            let params = FrameParams::new(frame.newest, frame.map, frame.phase);
+            let bytes = out.as_mut_bytes();
+            let size = bytes.len() as u64;
+            self.planes.sized(&gpu, Slot::Out, size)?;
+            self.planes.write_params(&gpu, &params)?;
+            let mut commands = gpu.device.create_command_encoder(&Default::default());
+            dispatch(&gpu, &mut commands, &self.frame_steps, &mut self.planes, &params)?;
+            let made = self.planes.sized(&gpu, Slot::Out, size)?;
+            self.download.copy(&gpu, &mut commands, made, size);
+            let submission = gpu.queue.submit([commands.finish()]);
+            self.download.read(&gpu, submission, bytes)
+        })
+    }
+}
+
+/// Adds `steps` to `commands`, one dispatch per entry point.
+fn dispatch(
+    gpu: &Gpu,
+    commands: &mut wgpu::CommandEncoder,
+    steps: &[Step],
+    planes: &mut Planes,
+    params: &FrameParams,
+) -> Result<(), GpuError> {
+    for (shader, compiled) in steps {
+        let group = planes.bind(gpu, shader, &compiled.layout)?;
+        let mut pass = commands.begin_compute_pass(&Default::default());
+        pass.set_bind_group(0, &group, &[]);
+        for (entry, pipeline) in shader.entries.iter().zip(&compiled.pipelines) {
+            let [columns, rows] = match entry.extent {
+                Extent::Pixels => params.size,
+                Extent::Cells => params.cells,
+                Extent::CellColumns => [params.cells[0], 1],
+                Extent::CellRows => [params.cells[1], 1],
+            };
+            pass.set_pipeline(pipeline);
+            let [width, height] = entry.workgroup;
+            pass.dispatch_workgroups(columns.div_ceil(width), rows.div_ceil(height), 1);
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

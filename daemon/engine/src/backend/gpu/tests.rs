@@ -1,0 +1,256 @@
+//! Every adapter of the machine makes the bytes that the CPU makes.
+
+use super::test_adapters::test_gpus;
+use super::*;
+use crate::backend::cpu::CpuBackend;
+use crate::key::Velocity;
+use crate::plane::{Plane, Rect};
+use crate::testing::{hash, key, map_of, noise, plane, pool};
+
+const FORMATS: [ColorFormat; 3] = [ColorFormat::Rgba8, ColorFormat::Rgb10a2, ColorFormat::Rgba16f];
+const WARPS: [Method; 2] = [Method::Gather, Method::Linear];
+
+/// A velocity of noise, up to `reach` pixels per axis; one in 64 is not trackable.
+fn velocity_noise(width: u32, height: u32, reach: i32, seed: u32) -> Plane<Velocity> {
+    plane(width, height, |x, y| {
+        // Patches of one motion, as surfaces are, among single cells.
+        let (px, py) = if seed.is_multiple_of(2) { (x / 5, y / 4) } else { (x, y) };
+        let steps = |salt: u32| {
+            let span = (64 * reach + 1).cast_unsigned();
+            ((hash(px, py, seed ^ salt) % span).cast_signed() - 32 * reach) as i16
+        };
+        if hash(x, y, seed ^ 7).is_multiple_of(64) {
+            Velocity::UNTRACKABLE
+        } else {
+            Velocity { x: steps(1), y: steps(2) }
+        }
+    })
+}
+
+/// Depth keys of noise with many ties.
+fn depth_noise(width: u32, height: u32, seed: u32) -> Plane<u32> {
+    plane(width, height, |x, y| match hash(x / 3, y / 3, seed) % 4 {
+        0 => u32::MAX,
+        1 => 1 << 20,
+        2 => (1 << 20) + hash(x, y, seed) % (1 << 13),
+        _ => hash(x, y, seed ^ 1),
+    })
+}
+
+fn phases() -> impl Iterator<Item = Phase> {
+    [1.0 / 4096.0, 0.37, 1.0, 2.5, 4.0].into_iter().map(Phase::from_f64)
+}
+
+fn on_cpu(method: Method, keys: &[&KeyFrame], phase: Phase) -> ColorPlane {
+    let [older, newest] = [keys[0], keys[keys.len() - 1]];
+    let pool = pool(1);
+    let map = map_of_moving(newest);
+    let mut cpu = CpuBackend::default();
+    cpu.take_key(&pool, method, newest);
+    let mut out = newest.color.clone();
+    cpu.make(&pool, &input(method, phase, older, newest, &map), &mut out);
+    out
+}
+
+fn on_gpu(
+    gpu: &Arc<Gpu>,
+    method: Method,
+    keys: &[&KeyFrame],
+    phases: impl Iterator<Item = Phase>,
+) -> Vec<ColorPlane> {
+    let [older, newest] = [keys[0], keys[keys.len() - 1]];
+    let mut backend = GpuBackend::new(gpu, newest.color.format(), method).unwrap();
+    for key in keys {
+        backend.take_key(key, &map_of_moving(key)).unwrap();
+    }
+    let map = map_of_moving(newest);
+    let make = |phase| {
+        let mut out = newest.color.clone();
+        backend.make(&input(method, phase, older, newest, &map), &mut out).unwrap();
+        out
+    };
+    phases.map(make).collect()
+}
+
+fn map_of_moving(key: &KeyFrame) -> FieldMap {
+    if key.velocity.data().is_empty() { FieldMap::default() } else { map_of(key) }
+}
+
+fn input<'a>(
+    method: Method,
+    phase: Phase,
+    older: &'a KeyFrame,
+    newest: &'a KeyFrame,
+    map: &'a FieldMap,
+) -> FrameInput<'a> {
+    FrameInput { method, phase, newest, previous: Some(older), map }
+}
+
+/// The first byte in which two pictures differ.
+fn difference(a: &ColorPlane, b: &ColorPlane) -> Option<usize> {
+    a.as_bytes().iter().zip(b.as_bytes()).position(|(a, b)| a != b)
+}
+
+fn assert_same(gpu: &Arc<Gpu>, method: Method, key: &KeyFrame, what: &str) {
+    for (phase, picture) in phases().zip(on_gpu(gpu, method, &[key], phases())) {
+        let expected = on_cpu(method, &[key], phase);
+        assert_eq!(
+            difference(&picture, &expected),
+            None,
+            "{what}: {method} of {:?} at phase {} on {}",
+            key.color.format(),
+            phase.as_f64(),
+            gpu.name()
+        );
+    }
+}
+
+#[test]
+fn every_adapter_warps_noise_as_the_cpu_does() {
+    // Size of the picture, of the field, speed in pixels.
+    let cases = [
+        ([17, 9], [17, 9], 3),
+        ([17, 9], [9, 5], 12),
+        ([64, 40], [64, 40], 6),
+        ([213, 120], [142, 80], 20),
+        ([333, 77], [84, 20], 1023),
+        ([3, 1], [1, 1], 2),
+    ];
+    for gpu in test_gpus("every_adapter_warps_noise_as_the_cpu_does") {
+        for (seed, (size, cells, reach)) in (0..).zip(cases) {
+            for (format, method) in FORMATS.iter().flat_map(|f| WARPS.map(|m| (*f, m))) {
+                let key = key(
+                    noise(format, size[0], size[1], seed),
+                    depth_noise(cells[0], cells[1], seed),
+                    velocity_noise(cells[0], cells[1], reach, seed),
+                );
+                assert_same(&gpu, method, &key, &format!("{size:?} over {cells:?}"));
+            }
+        }
+    }
+}
+
+#[test]
+fn every_adapter_minds_valid_rectangles_and_jitter() {
+    for gpu in test_gpus("every_adapter_minds_valid_rectangles_and_jitter") {
+        for (seed, method) in (0..).zip(WARPS) {
+            let mut key = key(
+                noise(ColorFormat::Rgba8, 101, 67, seed),
+                depth_noise(43, 31, seed),
+                velocity_noise(43, 31, 9, seed),
+            );
+            key.valid = Rect { x: 5, y: 11, width: 83, height: 47 };
+            key.field_offset = [97, -211];
+            assert_same(&gpu, method, &key, "letterbox and jitter");
+        }
+    }
+}
+
+#[test]
+fn every_adapter_warps_without_depth() {
+    for gpu in test_gpus("every_adapter_warps_without_depth") {
+        for seed in 0..2 {
+            let color = noise(ColorFormat::Rgba8, 80, 60, seed);
+            let key = key(color, Plane::default(), velocity_noise(40, 30, 15, seed));
+            assert_same(&gpu, Method::Linear, &key, "no depth");
+        }
+    }
+}
+
+#[test]
+fn every_adapter_fills_a_picture_that_moved_out_altogether() {
+    for gpu in test_gpus("every_adapter_fills_a_picture_that_moved_out_altogether") {
+        for velocity in [[1023, 0], [0, -1023], [200, 200]] {
+            let velocity =
+                plane(64, 48, |_, _| Velocity { x: velocity[0] * 32, y: velocity[1] * 32 });
+            let key = key(noise(ColorFormat::Rgba8, 128, 96, 5), depth_noise(64, 48, 3), velocity);
+            assert_same(&gpu, Method::Linear, &key, "gone");
+        }
+    }
+}
+
+#[test]
+fn every_adapter_warps_a_picture_8192_pixels_wide() {
+    for gpu in test_gpus("every_adapter_warps_a_picture_8192_pixels_wide") {
+        let key = key(
+            noise(ColorFormat::Rgba8, 8192, 6, 1),
+            depth_noise(8192, 6, 1),
+            velocity_noise(8192, 6, 40, 2),
+        );
+        assert_same(&gpu, Method::Linear, &key, "8192 wide");
+    }
+}
+
+#[test]
+fn every_adapter_blends_as_the_cpu_does() {
+    for gpu in test_gpus("every_adapter_blends_as_the_cpu_does") {
+        for format in FORMATS {
+            let keys = [1, 2, 3]
+                .map(|seed| key(noise(format, 53, 19, seed), Plane::default(), Plane::default()));
+            let [_, older, newer] = &keys;
+            let made = on_gpu(
+                &gpu,
+                Method::Blend,
+                &[&keys[0], older, newer],
+                std::iter::once(Phase::ZERO),
+            );
+            let expected = on_cpu(Method::Blend, &[older, newer], Phase::ZERO);
+            assert_eq!(difference(&made[0], &expected), None, "{format:?} on {}", gpu.name());
+        }
+    }
+}
+
+#[test]
+fn one_pixel_of_the_key_that_differs_is_found() {
+    for gpu in test_gpus("one_pixel_of_the_key_that_differs_is_found") {
+        for method in WARPS {
+            let still = plane(16, 16, |_, _| Velocity { x: 16, y: 0 });
+            let key = key(noise(ColorFormat::Rgba8, 16, 16, 9), Plane::default(), still);
+            let mut other = key.clone();
+            other.color.as_mut_bytes()[4 * (16 * 7 + 7)] ^= 8;
+            let made = on_gpu(&gpu, method, &[&other], std::iter::once(Phase::ONE));
+            let expected = on_cpu(method, &[&key], Phase::ONE);
+            assert_ne!(difference(&made[0], &expected), None, "{method} on {}", gpu.name());
+        }
+    }
+}
+
+#[test]
+fn a_plane_that_no_binding_holds_is_refused_with_both_numbers() {
+    for gpu in test_gpus("a_plane_that_no_binding_holds_is_refused_with_both_numbers") {
+        let limit = gpu.device.limits().max_storage_buffer_binding_size;
+        let error = Planes::default().sized(&gpu, Slot::Color, limit + 4).unwrap_err();
+        assert_eq!(error, GpuError::TooLarge { needed: limit + 4, limit });
+        let of_4096x2160_halves = 4096 * 2160 * 8;
+        assert!(limit >= of_4096x2160_halves, "{} binds only {limit}", gpu.name());
+    }
+}
+
+#[test]
+fn a_shader_that_does_not_compile_is_an_error_and_the_device_goes_on() {
+    for gpu in test_gpus("a_shader_that_does_not_compile_is_an_error_and_the_device_goes_on") {
+        let wrong_texts = [
+            "no shader at all",
+            "@compute @workgroup_size(16, 16) fn blend() { undeclared(); }",
+            "@compute @workgroup_size(16, 16) fn another_name() {}",
+        ];
+        for text in wrong_texts {
+            let error = gpu.compile(&BLEND, text, ColorFormat::Rgba8).unwrap_err();
+            assert!(matches!(error, GpuError::Refused { .. }), "{text}: {error}");
+        }
+        assert!(!gpu.is_lost());
+        GpuBackend::new(&gpu, ColorFormat::Rgba8, Method::Blend).unwrap();
+    }
+}
+
+#[test]
+fn a_step_before_its_key_is_an_error() {
+    for gpu in test_gpus("a_step_before_its_key_is_an_error") {
+        let key = key(noise(ColorFormat::Rgba8, 4, 4, 1), Plane::default(), Plane::default());
+        let mut backend = GpuBackend::new(&gpu, ColorFormat::Rgba8, Method::Blend).unwrap();
+        let mut out = key.color.clone();
+        let map = FieldMap::default();
+        let made = backend.make(&input(Method::Blend, Phase::ZERO, &key, &key, &map), &mut out);
+        assert!(matches!(made, Err(GpuError::Refused { .. })), "{made:?}");
+    }
+}

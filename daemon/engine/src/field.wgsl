@@ -1,0 +1,33 @@
+// The map between pixels and cells of the field grid, from the tables of `field.rs`:
+// one word per column of the valid rectangle, one per row, then the centres of the cells' columns
+// and of their rows. Expects a binding `tables`.
+
+struct Place {
+    // The cell that holds the pixel.
+    cell: u32,
+    // The last cell whose centre is not beyond the pixel, and the way to the next one in 1/256.
+    before: u32,
+    way: i32,
+}
+
+fn place_of(word: u32) -> Place {
+    let before = word & 0xffffu;
+    return Place(before + (word >> 24u), before, bitcast<i32>((word >> 16u) & 0xffu));
+}
+
+fn place_x(index: u32) -> Place {
+    return place_of(tables[index]);
+}
+
+fn place_y(index: u32) -> Place {
+    return place_of(tables[params.valid_size.x + index]);
+}
+
+// Centre of a cell, Q8 pixels.
+fn centre(cell: vec2<u32>) -> vec2<i32> {
+    let centres = params.valid_size.x + params.valid_size.y;
+    return vec2<i32>(
+        bitcast<i32>(tables[centres + cell.x]),
+        bitcast<i32>(tables[centres + params.cells.x + cell.y]),
+    );
+}

@@ -1,0 +1,116 @@
+//! The parameters that every kernel's shader shares, and how the field map goes to it.
+//!
+//! A parameter is computed here once, with the functions that the CPU's kernels use, so that the two
+//! cannot differ in it. `common.wgsl` declares the same struct; a test compares the offsets.
+
+use zerocopy::{Immutable, IntoBytes};
+
+use crate::color::ColorFormat;
+use crate::field::{FieldAxis, FieldMap};
+use crate::key::KeyFrame;
+use crate::phase::Phase;
+use crate::warp::linear::one_cell;
+use crate::warp::resolve::smooth_limit;
+use crate::warp::scatter::phase_in_cells;
+
+/// What every kernel's shader reads beside planes: `FrameParams` of `common.wgsl`.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, IntoBytes, Immutable)]
+#[repr(C)]
+pub struct FrameParams {
+    /// Columns and rows of the colour plane.
+    pub size: [u32; 2],
+    /// First column and row of the valid rectangle.
+    pub valid_start: [u32; 2],
+    /// Columns and rows of the valid rectangle.
+    pub valid_size: [u32; 2],
+    /// Columns and rows of the field grid; 0 without one.
+    pub cells: [u32; 2],
+    /// The phase in the unit that turns velocities into Q8 cells, per axis.
+    pub cell_scale: [i32; 2],
+    /// The phase, Q12.
+    pub phase: i32,
+    /// Largest range of velocities around a smooth cell, 1/32 pixel per span.
+    pub smooth_limit: u32,
+    /// Mean of a cell's width and height, Q8 pixels.
+    pub one_cell: i32,
+    /// 1 where the key has depth, else 0.
+    pub has_depth: u32,
+}
+
+impl FrameParams {
+    /// Of the frame at `phase` after `key`; `map` is the map of its field, if it has one.
+    #[must_use]
+    pub fn new(key: &KeyFrame, map: &FieldMap, phase: Phase) -> Self {
+        let valid = key.valid;
+        let mut params = Self {
+            size: [key.color.width(), key.color.height()],
+            valid_start: [valid.x, valid.y],
+            valid_size: [valid.width, valid.height],
+            phase: phase.q12(),
+            has_depth: u32::from(!key.depth.data().is_empty()),
+            ..Self::default()
+        };
+        if !key.velocity.data().is_empty() {
+            params.cells = [map.x.cells(), map.y.cells()];
+            params.cell_scale = [phase_in_cells(phase, &map.x), phase_in_cells(phase, &map.y)];
+            params.smooth_limit = u32::from(smooth_limit(phase));
+            params.one_cell = one_cell(map);
+        }
+        params
+    }
+}
+
+/// What shaders call a colour format: the constants of `color.wgsl`.
+#[must_use]
+pub const fn format_code(format: ColorFormat) -> u32 {
+    match format {
+        ColorFormat::Rgba8 => 0,
+        ColorFormat::Rgb10a2 => 1,
+        ColorFormat::Rgba16f => 2,
+    }
+}
+
+/// The words of `field.wgsl`'s tables: one per column of the valid rectangle, one per row, then the
+/// centres of the columns and of the rows of cells.
+///
+/// A pixel's word holds the cell before it in bits 0 to 15, the way to the next one in bits 16 to
+/// 23, and above them what is to be added for the cell that holds the pixel, 0 or 1.
+pub fn map_words(map: &FieldMap, words: &mut Vec<u32>) {
+    words.clear();
+    let axes = [&map.x, &map.y];
+    for axis in axes {
+        words.extend((0..axis.pixels()).map(|index| place_word(axis, index)));
+    }
+    for axis in axes {
+        words.extend((0..axis.cells()).map(|cell| axis.centre(cell).cast_unsigned()));
+    }
+}
+
+fn place_word(axis: &FieldAxis, index: u32) -> u32 {
+    let ((before, way), cell) = (axis.before(index), axis.cell_of(index));
+    before | way << 16 | (cell - before) << 24
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plane::Rect;
+
+    #[test]
+    fn the_cell_that_holds_a_pixel_is_the_one_before_it_or_the_next() {
+        for (pixels, cells, offset) in [(853, 569, 0), (17, 9, 90), (640, 640, -200), (40, 10, 700)]
+        {
+            let mut map = FieldMap::default();
+            map.update(Rect { x: 3, y: 0, width: pixels, height: 1 }, [cells, 1], [offset, 0]);
+            let mut words = Vec::new();
+            map_words(&map, &mut words);
+            assert_eq!(words.len() as u32, pixels + 1 + cells + 1);
+            for index in 0..pixels {
+                let word = words[index as usize];
+                assert!(word >> 24 <= 1, "pixel {index} of {pixels}");
+                assert_eq!((word & 0xffff) + (word >> 24), map.x.cell_of(index));
+                assert_eq!((word & 0xffff, word >> 16 & 0xff), map.x.before(index));
+            }
+        }
+    }
+}

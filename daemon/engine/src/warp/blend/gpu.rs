@@ -1,0 +1,11 @@
+//! The shader of [`super`].
+
+use crate::backend::shader::{Binding, COLOR, COMMON, Entry, Extent, Shader, Slot};
+
+/// Equation (1).
+pub const BLEND: Shader = Shader {
+    file: "blend.wgsl",
+    parts: &[COMMON, COLOR, include_str!("blend.wgsl")],
+    bindings: &[Binding::Read(Slot::Color), Binding::Read(Slot::Older), Binding::Write(Slot::Out)],
+    entries: &[Entry::tiles("blend", Extent::Pixels)],
+};

@@ -1,0 +1,16 @@
+//! The shader of [`super`].
+
+use crate::backend::shader::{Binding, COLOR, COMMON, Entry, Extent, FIELD, Shader, Slot};
+
+/// Equation (1).
+pub const GATHER: Shader = Shader {
+    file: "gather.wgsl",
+    parts: &[COMMON, FIELD, COLOR, include_str!("gather.wgsl")],
+    bindings: &[
+        Binding::Read(Slot::Color),
+        Binding::Read(Slot::Velocity),
+        Binding::Read(Slot::Tables),
+        Binding::Write(Slot::Out),
+    ],
+    entries: &[Entry::tiles("warp_gather", Extent::Pixels)],
+};
