@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
 
+use foreframe_engine::backend::choice::BackendChoice;
 use foreframe_engine::{Method, MonoSpan};
 use serde::{Deserialize, Deserializer};
 use tracing_subscriber::EnvFilter;
@@ -30,9 +31,11 @@ pub struct Args {
     /// Refresh rate of the output, 1 to 1000 [default: 120]
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub refresh: Option<f64>,
-    /// What the engine runs on: auto or cpu [default: auto]
+    /// What makes the pictures: auto, cpu, gpu or gpu:NAME; `foreframe adapters` says what auto takes
+    /// [default: auto]
     #[arg(long)]
-    pub backend: Option<Backend>,
+    #[serde(default, deserialize_with = "from_name")]
+    pub backend: Option<BackendChoice>,
     /// How in-between frames are made: hold, blend, gather, grid or linear [default: linear]
     #[arg(long)]
     #[serde(default, deserialize_with = "from_name")]
@@ -121,17 +124,6 @@ impl<'de> Deserialize<'de> for SinkSpec {
     }
 }
 
-/// What the engine runs on.
-#[derive(clap::ValueEnum, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
-#[serde(rename_all = "kebab-case")]
-pub enum Backend {
-    /// The best that this machine has.
-    #[default]
-    Auto,
-    /// The processor.
-    Cpu,
-}
-
 /// A count of things of which there is at least one.
 ///
 /// # Errors
@@ -169,8 +161,8 @@ pub struct Config {
     pub sink: SinkSpec,
     /// Period of the output.
     pub refresh_interval: MonoSpan,
-    /// What the engine runs on.
-    pub backend: Backend,
+    /// What makes the pictures.
+    pub backend: BackendChoice,
     /// How in-between frames are made.
     pub method: Method,
     /// Capture to write.
@@ -255,7 +247,7 @@ impl Args {
             socket: self.socket,
             sink: self.sink.unwrap_or_default(),
             refresh_interval: MonoSpan::from_hz(refresh),
-            backend: self.backend.unwrap_or_default(),
+            backend: self.backend.unwrap_or(BackendChoice::Auto),
             method: self.method.unwrap_or_default(),
             record: self.record,
             threads: self.threads.unwrap_or(processors),

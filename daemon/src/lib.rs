@@ -5,11 +5,12 @@
 //! ([`server`]), copied and turned into pictures by the thread of its [`stream`], and leaves
 //! through a [`sink`] or to subscribers. The [`recorder`] keeps what came in as a [`capture`].
 //! [`ingest`] translates the protocol's words into the engine's, [`clock`] is the only reader of
-//! clocks, [`config`] says what was asked for.
+//! clocks, [`config`] says what was asked for, [`gpu`] what the machine has for it.
 
 pub mod capture;
 pub mod clock;
 pub mod config;
+pub mod gpu;
 pub mod ingest;
 pub mod recorder;
 pub mod server;

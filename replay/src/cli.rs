@@ -3,7 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    bench, completions, demo, export, import, info, man, pacing, replay, scenes, score, serve,
+    adapters, bench, completions, demo, export, import, info, man, pacing, replay, scenes, score,
+    serve,
 };
 use crate::output::Output;
 use foreframed::UsageError;
@@ -44,6 +45,8 @@ pub enum Command {
     Score(score::Args),
     /// Time the engine on built-in scenes, beside plain copies of the same bytes.
     Bench(bench::Args),
+    /// List the GPU adapters, and say which one would be chosen.
+    Adapters(adapters::Args),
     /// Run the pacer against a simulated display and clock.
     Pacing(pacing::Args),
     /// Print a shell completion script.
@@ -86,6 +89,7 @@ impl Cli {
             Command::Replay(args) => replay::run(&args, &output),
             Command::Score(args) => score::run(&args, &output),
             Command::Bench(args) => bench::run(&args, &output),
+            Command::Adapters(args) => adapters::run(&args, &output),
             Command::Pacing(args) => pacing::run(&args, &output),
             Command::Completions(args) => completions::run(&args),
             Command::Man(args) => man::run(&args, &output),

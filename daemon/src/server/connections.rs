@@ -155,7 +155,12 @@ impl Server {
                     Ok(hello) => {
                         info!(session = id, application = hello.application, "client connected");
                         session.stage = Stage::Open;
-                        let welcome = self.terms.welcome(&hello, id, now);
+                        let chosen = self.gpus.choose_for(hello.gpu_pci);
+                        session.adapter = chosen.adapter;
+                        let adapter = chosen.adapter.map(|index| &self.gpus.facts()[index]);
+                        let backend = adapter.map_or("cpu", |facts| &facts.name);
+                        info!(session = id, backend, why = chosen.why, "backend chosen");
+                        let welcome = self.terms.welcome(&hello, adapter, id, now);
                         self.send(id, welcome);
                     }
                     Err(reject) => return self.reject(id, &reject),

@@ -18,6 +18,7 @@ mod subscriptions;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use anyhow::Context as _;
 use calloop::generic::Generic;
@@ -33,6 +34,7 @@ use tracing::{info, warn};
 use crate::capture::{CaptureSource, PIXELS_PER_DEGREE, SessionInfo};
 use crate::clock;
 use crate::config::{Config, SinkSpec};
+use crate::gpu::Gpus;
 use crate::recorder::Recorder;
 use crate::session::Session;
 use crate::session::handshake::Terms;
@@ -81,6 +83,7 @@ struct Server {
     events: calloop::channel::Sender<FromStream>,
     /// An instant of the refresh grid, which all streams share.
     display_origin: MonoTime,
+    gpus: Arc<Gpus>,
     reaper: Reaper,
     allocator: Allocator,
     recorder: Option<Recorder>,
@@ -94,6 +97,7 @@ impl Daemon {
     /// be used, or a file cannot be made.
     pub fn bind(config: Config) -> anyhow::Result<Self> {
         sink::prepare(&config.sink)?;
+        let gpus = Gpus::find(config.backend.clone()).context("--backend")?;
         let path = match &config.socket {
             Some(path) => path.clone(),
             None => default_socket_path()?,
@@ -132,6 +136,7 @@ impl Daemon {
             next_ordinal: 0,
             events,
             display_origin: clock::now(),
+            gpus: Arc::new(gpus),
             reaper,
             allocator,
             recorder,

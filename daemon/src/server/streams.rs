@@ -92,6 +92,7 @@ impl Server {
         };
         let waker = Waker::new().context("making a waker")?;
         let mailbox = Arc::new(Mailbox::new(create.slots, waker));
+        let chosen = self.sessions.get(&session).and_then(|session| session.adapter);
         let number_in_file = u32::try_from(ordinal + 1).context("numbering the stream")?;
         let thread = thread::start(StreamParts {
             ordinal,
@@ -107,6 +108,7 @@ impl Server {
                 refresh_interval: config.refresh_interval,
                 display_origin: self.display_origin,
             },
+            gpu: chosen.map(|index| (Arc::clone(&self.gpus), index)),
             mailbox: Arc::clone(&mailbox),
             events: self.events.clone(),
             sink,

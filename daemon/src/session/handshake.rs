@@ -1,11 +1,14 @@
 //! The first packet of a session: a hello that is welcomed, or a reason why not.
 
+use foreframe_engine::backend::choice::AdapterFacts;
 use foreframe_engine::{MonoSpan, MonoTime};
 use foreframe_protocol::limits::{MAJOR, MAX_POOL_BYTES, MAX_SIZE, MAX_SLOTS, MINOR};
 use foreframe_protocol::socket::Incoming;
 use foreframe_protocol::{
     ClientMessage, Clock, Error, Features, GpuKind, Hello, Reject, RejectCode, Welcome,
 };
+
+use crate::gpu;
 
 /// What the daemon grants every client.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -47,9 +50,15 @@ impl Terms {
         Ok(hello)
     }
 
-    /// The answer to a hello.
+    /// The answer to a hello; `adapter` makes the client's pictures, or else the CPU does.
     #[must_use]
-    pub fn welcome(&self, hello: &Hello, session: u32, now: MonoTime) -> Welcome {
+    pub fn welcome(
+        &self,
+        hello: &Hello,
+        adapter: Option<&AdapterFacts>,
+        session: u32,
+        now: MonoTime,
+    ) -> Welcome {
         let wanted = Features(hello.required_features.0 | hello.optional_features.0);
         Welcome {
             major: MAJOR,
@@ -64,9 +73,9 @@ impl Terms {
             max_height: MAX_SIZE,
             max_pool_bytes: self.memory_per_client.min(MAX_POOL_BYTES),
             refresh_interval_ns: self.refresh_interval.as_ns().unsigned_abs(),
-            gpu_kind: GpuKind::Cpu,
-            gpu_name: "cpu".to_owned(),
-            gpu_pci: None,
+            gpu_kind: adapter.map_or(GpuKind::Cpu, |facts| gpu::kind(facts.kind)),
+            gpu_name: adapter.map_or("cpu", |facts| &facts.name).to_owned(),
+            gpu_pci: adapter.and_then(gpu::pci_address),
         }
     }
 }

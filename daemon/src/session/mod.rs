@@ -77,6 +77,8 @@ pub struct Session {
     pub channel: Rc<Channel>,
     /// How far it is.
     pub stage: Stage,
+    /// The GPU adapter that makes its pictures, by its index; None is the CPU.
+    pub adapter: Option<usize>,
     /// How much it may ask for.
     pub gate: FloodGate,
     /// Its streams: numbers of the process by numbers of the client. One that ends stays until its
@@ -107,6 +109,7 @@ impl Session {
             id,
             channel: Rc::new(channel),
             stage: Stage::Connected,
+            adapter: None,
             gate: FloodGate::new(now),
             streams: BTreeMap::new(),
             last_stream: 0,

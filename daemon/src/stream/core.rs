@@ -4,6 +4,10 @@
 //! it. [`super::thread`] waits and carries things to and fro; nothing here waits, sends or reads a
 //! clock other than the one it is given.
 
+use std::sync::Arc;
+
+use foreframe_engine::backend::BackendStatus;
+use foreframe_engine::backend::gpu::Gpu;
 use foreframe_engine::engine::MotionState;
 use foreframe_engine::pacing::{Pacer, PacerConfig, PacerStatus, Plan, TimerDisplay, WorkEstimate};
 use foreframe_engine::{
@@ -152,6 +156,17 @@ impl StreamCore {
             shown: None,
             counted_until: None,
         }
+    }
+
+    /// Makes the pictures on `gpu`, in a stream that has had no key.
+    pub fn use_gpu(&mut self, gpu: &Arc<Gpu>) {
+        self.engine.use_gpu(gpu);
+    }
+
+    /// What makes the pictures.
+    #[must_use]
+    pub fn backend(&self) -> &BackendStatus {
+        self.engine.backend()
     }
 
     /// Takes in a key. `clock` says when that is done: from then on it can be shown.

@@ -26,6 +26,7 @@ use super::mailbox::{Mailbox, Submission, Taken};
 use super::planes::PlaneCopier;
 use super::{FromStream, StreamEvent};
 use crate::clock::{self, Alarm, Woken};
+use crate::gpu::Gpus;
 use crate::ingest;
 use crate::recorder::StreamRecorder;
 use crate::sink::worker::SinkWorker;
@@ -47,6 +48,8 @@ pub struct StreamParts {
     pub create: CreateStream,
     /// How engine and display work.
     pub core: CoreConfig,
+    /// The GPU adapter that makes the pictures, by its index; without it the CPU does.
+    pub gpu: Option<(Arc<Gpus>, usize)>,
     /// Where keys come from.
     pub mailbox: Arc<Mailbox>,
     /// Where events go.
@@ -95,6 +98,8 @@ struct StreamThread {
     owes_picture: bool,
     refused: u64,
     repeats_in_a_row: u32,
+    /// Whether it was said that the CPU took over from the GPU.
+    told_of_fall: bool,
     /// What taking in the newest key took.
     key_work: MonoSpan,
     synthesis: Mean,
@@ -117,7 +122,14 @@ impl StreamThread {
     fn new(parts: StreamParts) -> Self {
         let format = ingest::stream_format(&parts.create.format);
         // Before real-time priority is asked for: the engine's workers must not inherit it.
-        let core = StreamCore::new(format, &parts.core);
+        let mut core = StreamCore::new(format, &parts.core);
+        if let Some((gpus, index)) = &parts.gpu {
+            match gpus.open(*index) {
+                Ok(gpu) => core.use_gpu(&gpu),
+                Err(error) => warn!(%error, "the CPU makes the pictures"),
+            }
+        }
+        info!(stream = parts.ordinal, backend = core.backend().name, "stream starts");
         Self {
             parts,
             core,
@@ -126,6 +138,7 @@ impl StreamThread {
             owes_picture: false,
             refused: 0,
             repeats_in_a_row: 0,
+            told_of_fall: false,
             key_work: MonoSpan::ZERO,
             synthesis: Mean::default(),
             statistics_due_at: clock::now(),
@@ -224,7 +237,9 @@ impl StreamThread {
 
     fn make_frame(&mut self, plan: &Plan) {
         self.owes_picture = false;
-        let Some(outcome) = self.core.make(plan, clock::now) else { return };
+        let outcome = self.core.make(plan, clock::now);
+        self.watch_backend();
+        let Some(outcome) = outcome else { return };
         match outcome {
             FrameOutcome::Repeated => self.repeats_in_a_row += 1,
             FrameOutcome::Dropped(DroppedFrame { kind, work }) => {
@@ -246,6 +261,14 @@ impl StreamThread {
     fn add_work(&mut self, kind: FrameKind, work: MonoSpan) {
         if kind == FrameKind::Synthesised {
             self.synthesis.add(work);
+        }
+    }
+
+    /// Says once why the CPU has taken over.
+    fn watch_backend(&mut self) {
+        if let Some(why) = self.core.backend().fell_back.as_ref().filter(|_| !self.told_of_fall) {
+            warn!(stream = self.parts.ordinal, why, "the CPU makes the pictures from now on");
+            self.told_of_fall = true;
         }
     }
 

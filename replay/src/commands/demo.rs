@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use foreframe_engine::Method;
+use foreframe_engine::backend::choice::BackendChoice;
 use foreframe_fixtures::{SceneInfo, Size};
 use foreframed::config::SinkSpec;
 
@@ -37,6 +38,9 @@ pub struct Args {
     /// How in-between frames are made
     #[arg(long, value_name = "NAME", default_value_t = Method::Linear)]
     pub method: Method,
+    /// What makes them: auto, cpu, gpu or gpu:NAME
+    #[arg(long, default_value_t = BackendChoice::Cpu)]
+    pub backend: BackendChoice,
     /// Where the daemon sends frames besides: shm (the demo alone), png:DIR or y4m:PATH
     #[arg(long, default_value_t = SinkSpec::Shm, value_parser = parse_sink)]
     pub sink: SinkSpec,
@@ -57,6 +61,7 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
         key_rate_hz: args.key_rate,
         refresh_hz: args.refresh,
         method: args.method,
+        backend: args.backend.clone(),
         sink: args.sink.to_string(),
         out: args.out.clone(),
     };

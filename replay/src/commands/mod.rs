@@ -1,5 +1,6 @@
 //! One module per command: `Args` (what was typed) and `run` (read, call, report).
 
+pub mod adapters;
 pub mod bench;
 pub mod completions;
 pub mod demo;

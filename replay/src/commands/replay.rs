@@ -5,12 +5,14 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use anyhow::{Context as _, bail};
+use foreframe_engine::backend::choice::BackendChoice;
 use foreframe_engine::{Method, MonoSpan};
-use foreframed::config::{Backend, SinkSpec};
+use foreframed::config::SinkSpec;
+use foreframed::gpu;
 use foreframed::sink::Sink;
 use serde::Serialize;
 
-use super::score::all_processors;
+use super::score::{all_processors, backend_name};
 use crate::options::{number, parse_count};
 use crate::output::Output;
 use crate::recording::Recording as _;
@@ -30,9 +32,9 @@ pub struct Args {
     /// How in-between frames are made: hold, blend, gather, grid or linear.
     #[arg(long, default_value_t = Method::Linear)]
     pub method: Method,
-    /// What the engine runs on.
-    #[arg(long, value_enum, default_value_t = Backend::Auto)]
-    pub backend: Backend,
+    /// What makes the pictures, which does not change them: auto, cpu, gpu or gpu:NAME.
+    #[arg(long, default_value_t = BackendChoice::Cpu)]
+    pub backend: BackendChoice,
     /// Refresh rate of the virtual display, 1 to 1000.
     #[arg(long, value_name = "HZ", default_value_t = 120.0, value_parser = number(1.0, 1000.0))]
     #[arg(allow_negative_numbers = true)]
@@ -75,6 +77,7 @@ fn parse_sink(spec: &str) -> Result<SinkSpec, String> {
 struct Replayed {
     digest: String,
     method: &'static str,
+    backend: String,
     keys: usize,
     refused: usize,
     superseded: u64,
@@ -111,6 +114,7 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
     let refresh_interval = MonoSpan::from_hz(args.refresh);
     let config = ReplayConfig {
         method: args.method,
+        gpu: gpu::open(&args.backend).context("--backend")?,
         threads: args.threads.unwrap_or_else(all_processors),
         refresh_interval,
         pixels_per_degree: match args.ppd {
@@ -150,9 +154,13 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
     for refused in &losses.refused {
         eprintln!("foreframe: {name}: refused {refused}");
     }
+    if let Some(why) = &losses.fell_back {
+        eprintln!("foreframe: {name}: the CPU took over: {why}");
+    }
     let replayed = Replayed {
         digest: digester.all(),
         method: args.method.name(),
+        backend: backend_name(config.gpu.as_ref()),
         keys: plan.keys.len(),
         refused: losses.refused.len(),
         superseded: losses.superseded,

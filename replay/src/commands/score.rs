@@ -2,11 +2,13 @@
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use anyhow::Context as _;
 use foreframe_engine::Method;
-use foreframed::clock;
-use foreframed::config::Backend;
+use foreframe_engine::backend::choice::BackendChoice;
+use foreframe_engine::backend::gpu::Gpu;
+use foreframed::{clock, gpu};
 
 use crate::options::{parse_count, parse_ratio};
 use crate::output::Output;
@@ -27,9 +29,9 @@ pub struct Args {
     /// Methods to compare: names with commas between, or all.
     #[arg(long, value_name = "A,B", default_value = "all", value_parser = parse_methods)]
     pub methods: Methods,
-    /// What the engine runs on.
-    #[arg(long, value_enum, default_value_t = Backend::Auto)]
-    pub backend: Backend,
+    /// What makes the frames, which does not change them: auto, cpu, gpu or gpu:NAME.
+    #[arg(long, default_value_t = BackendChoice::Cpu)]
+    pub backend: BackendChoice,
     /// Threads of the engine [default: as many as there are processors]
     #[arg(long, value_name = "N", value_parser = parse_count, allow_negative_numbers = true)]
     pub threads: Option<NonZeroUsize>,
@@ -47,6 +49,7 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
     let options = ScoreOptions {
         methods: args.methods.0.clone(),
         ratio: args.ratio,
+        gpu: gpu::open(&args.backend).context("--backend")?,
         threads: args.threads.unwrap_or_else(all_processors),
         timer: clock::now,
     };
@@ -72,6 +75,11 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
     progress.finish_and_clear();
     let report = Report::new(options.threads.get(), scores);
     output.result(&report, &report.to_text())
+}
+
+/// What reports call the backend.
+pub(crate) fn backend_name(gpu: Option<&Arc<Gpu>>) -> String {
+    gpu.map_or_else(|| "cpu".to_owned(), |gpu| format!("gpu:{}", gpu.name()))
 }
 
 /// As many threads as there are processors, one where the system does not say.

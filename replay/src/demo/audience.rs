@@ -229,6 +229,7 @@ mod tests {
             seconds: 0.1,
             key_rate_hz: 40.0,
             refresh_hz: 120.0,
+            backend: foreframe_engine::backend::choice::BackendChoice::Cpu,
             method: Method::Linear,
             sink: "null".to_owned(),
             out: PathBuf::new(),

@@ -45,6 +45,7 @@ impl DaemonProcess {
             .args(["--sink", &settings.sink])
             .args(["--refresh", &settings.refresh_hz.to_string()])
             .args(["--method", settings.method.name()])
+            .args(["--backend", &settings.backend.to_string()])
             .args(["--log", "warn"])
             .args(["--with-parent", &std::process::id().to_string()])
             .stdin(Stdio::null())

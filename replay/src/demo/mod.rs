@@ -18,6 +18,7 @@ use std::time::Duration;
 
 use anyhow::anyhow;
 use foreframe_client::ConnectOptions;
+use foreframe_engine::backend::choice::BackendChoice;
 use foreframe_engine::{Method, MonoSpan};
 use foreframe_fixtures::{SceneInfo, Size};
 use foreframed::clock;
@@ -49,6 +50,8 @@ pub struct Settings {
     pub refresh_hz: f64,
     /// How in-between frames are made.
     pub method: Method,
+    /// What makes them.
+    pub backend: BackendChoice,
     /// Sink of the daemon, as on its command line.
     pub sink: String,
     /// Where the pictures and the summary go.

@@ -349,6 +349,7 @@ fn median_ms(spans: &[MonoSpan]) -> Option<f64> {
 mod tests {
     use super::*;
     use foreframe_engine::MonoSpan;
+    use foreframe_engine::backend::choice::BackendChoice;
 
     /// Frames shown at the given refreshes of a 100 Hz display, content times in ms.
     fn shown(frames: &[(i64, u64)]) -> Vec<Shown> {
@@ -371,6 +372,7 @@ mod tests {
             seconds: 0.1,
             key_rate_hz: 40.0,
             refresh_hz: 120.0,
+            backend: BackendChoice::Cpu,
             method: foreframe_engine::Method::Linear,
             sink: "shm".to_owned(),
             out: out.to_owned(),

@@ -6,8 +6,10 @@
 //! while an engine works nothing else runs here; comparing is done afterwards, in parallel.
 
 use std::num::NonZeroUsize;
+use std::sync::Arc;
 
 use anyhow::Context as _;
+use foreframe_engine::backend::gpu::Gpu;
 use foreframe_engine::{ColorPlane, Engine, EngineConfig, Method, MonoTime, Plane, StreamFormat};
 use foreframed::sink::srgb::SrgbConverter;
 use rayon::prelude::*;
@@ -26,6 +28,8 @@ pub struct ScoreOptions {
     pub methods: Vec<Method>,
     /// Frames from key to key.
     pub ratio: NonZeroUsize,
+    /// Makes the frames; without it the CPU does.
+    pub gpu: Option<Arc<Gpu>>,
     /// Threads of the engine.
     pub threads: NonZeroUsize,
     /// The clock of the engine's work reports.
@@ -120,7 +124,11 @@ fn engine_of(method: Method, format: StreamFormat, options: &ScoreOptions) -> En
         timer: options.timer,
         worker_started: || (),
     };
-    Engine::new(format, config)
+    let mut engine = Engine::new(format, config);
+    if let Some(gpu) = &options.gpu {
+        engine.use_gpu(gpu);
+    }
+    engine
 }
 
 /// One method on its way through a recording.

@@ -8,9 +8,11 @@
 pub mod digest;
 pub mod keys;
 
+use foreframe_engine::backend::gpu::Gpu;
 use foreframe_engine::{ColorPlane, EngineConfig, Method, MonoSpan, MonoTime, Phase, StreamFormat};
 use foreframed::stream::core::{CoreConfig, FrameKind, FrameOutcome, PresentedFrame, StreamCore};
 use std::num::NonZeroUsize;
+use std::sync::Arc;
 
 use crate::recording::Frame;
 
@@ -18,10 +20,12 @@ use crate::recording::Frame;
 const MAX_WORK: MonoSpan = MonoSpan::from_ms(1);
 
 /// How to replay.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct ReplayConfig {
     /// How in-between frames are made.
     pub method: Method,
+    /// Makes the pictures; without it the CPU does. The pictures do not depend on it.
+    pub gpu: Option<Arc<Gpu>>,
     /// Threads of the engine. The pictures do not depend on it.
     pub threads: NonZeroUsize,
     /// Period of the display.
@@ -68,6 +72,8 @@ pub struct Losses {
     pub superseded: u64,
     /// Why each refused key was refused, in order.
     pub refused: Vec<String>,
+    /// Why the CPU took over from the GPU, if it did.
+    pub fell_back: Option<String>,
 }
 
 /// A key and when it arrives.
@@ -122,6 +128,7 @@ pub fn replay(
         let has_shown_all = next.is_none() && !stream.owes_picture;
         let is_over = has_shown_all && plan.present_at > last_arrivals[1] + interval;
         if plan.content_time.is_none() || (is_over && stream.shown.is_some()) {
+            losses.fell_back = stream.core.backend().fell_back.clone();
             return Ok(losses);
         }
         clock = plan.wake_at + stream.work;
@@ -150,7 +157,7 @@ struct VirtualStream {
 impl VirtualStream {
     fn new(format: StreamFormat, config: &ReplayConfig, origin: MonoTime) -> Self {
         let refresh_interval = config.refresh_interval;
-        let core = StreamCore::new(
+        let mut core = StreamCore::new(
             format,
             &CoreConfig {
                 engine: EngineConfig {
@@ -164,6 +171,9 @@ impl VirtualStream {
                 display_origin: origin,
             },
         );
+        if let Some(gpu) = &config.gpu {
+            core.use_gpu(gpu);
+        }
         let work = MAX_WORK.min(refresh_interval.scale(1, 4));
         let picture = ColorPlane::default();
         Self { core, work, refresh_interval, shown: None, picture, owes_picture: false }

@@ -48,6 +48,7 @@ fn replayed_plan(
     let reader = KeyReader::new(recording.format(), plan).unwrap();
     let config = ReplayConfig {
         method,
+        gpu: None,
         threads: count(threads),
         refresh_interval: MonoSpan::from_hz(refresh_hz),
         pixels_per_degree: None,
@@ -190,6 +191,7 @@ fn an_error_of_the_sink_ends_the_replay() {
     let reader = KeyReader::new(recording.format(), &plan).unwrap();
     let config = ReplayConfig {
         method: Method::Hold,
+        gpu: None,
         threads: count(1),
         refresh_interval: MonoSpan::from_hz(60.0),
         pixels_per_degree: None,
@@ -217,6 +219,7 @@ fn what_is_repeated_is_the_picture_that_was_shown_and_not_one_that_was_dropped()
     let reader = KeyReader::new(recording.format(), &plan).unwrap();
     let config = ReplayConfig {
         method: Method::Hold,
+        gpu: None,
         threads: count(1),
         refresh_interval: MonoSpan::from_hz(100.0),
         pixels_per_degree: None,

@@ -12,6 +12,7 @@ fn options(methods: &[Method]) -> ScoreOptions {
     ScoreOptions {
         methods: methods.to_vec(),
         ratio: count(4),
+        gpu: None,
         threads: count(1),
         timer: || MonoTime::ZERO,
     }
