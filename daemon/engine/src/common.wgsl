@@ -13,6 +13,7 @@ struct FrameParams {
     smooth_limit: u32,
     one_cell: i32,
     has_depth: u32,
+    mesh_cells: vec2<u32>,
 }
 
 @group(0) @binding(0) var<uniform> params: FrameParams;

@@ -8,6 +8,7 @@ use crate::backend::shader::Shader;
 use crate::fill::far_side::FAR_SIDE;
 use crate::warp::blend::BLEND;
 use crate::warp::gather::GATHER;
+use crate::warp::grid::GRID;
 use crate::warp::linear::LINEAR;
 use crate::warp::resolve::{CLASSIFY, RESOLVE};
 use crate::warp::scatter::{SCATTER, SOURCE};
@@ -47,6 +48,7 @@ pub const KERNELS: &[Kernel] = &[
     exact("fill/far_side", "far_side", Some(&FAR_SIDE)),
     exact("warp/resolve", "classify", Some(&CLASSIFY)),
     exact("warp/linear", "warp_linear", Some(&LINEAR)),
+    exact("warp/grid", "warp_grid", Some(&GRID)),
 ];
 
 #[cfg(test)]

@@ -35,6 +35,8 @@ pub struct FrameParams {
     pub one_cell: i32,
     /// 1 where the key has depth, else 0.
     pub has_depth: u32,
+    /// Columns and rows of the mesh's cells; 0 without one.
+    pub mesh_cells: [u32; 2],
 }
 
 impl FrameParams {

@@ -39,6 +39,10 @@ pub enum Extent {
     CellColumns,
     /// Each row of the field grid.
     CellRows,
+    /// Each triangle of the mesh.
+    Triangles,
+    /// [`crate::warp::grid::LANES`] for each triangle of the mesh, side by side.
+    TriangleLanes,
 }
 
 /// A buffer as a shader sees it.
@@ -93,6 +97,16 @@ pub enum Slot {
     BesideColumns,
     /// Class of a cell.
     Broken,
+    /// Vertices of the mesh.
+    Vertices,
+    /// Which way its cells are cut.
+    Cuts,
+    /// Its triangles after the warp.
+    Triangles,
+    /// Largest depth of the triangles over a pixel.
+    Nearest,
+    /// The triangle that a pixel shows.
+    Shown,
     /// The picture.
     Out,
 }

@@ -114,7 +114,7 @@ mod on_gpus {
     use super::*;
     use crate::backend::gpu::test_adapters::test_gpus;
 
-    const MOVING: [Method; 3] = [Method::Blend, Method::Gather, Method::Linear];
+    const MOVING: [Method; 4] = [Method::Blend, Method::Gather, Method::Grid, Method::Linear];
 
     /// What two engines show over three keys, two frames each, the second one after `event` was
     /// told of each step.
@@ -133,7 +133,7 @@ mod on_gpus {
     #[test]
     fn a_stream_on_a_gpu_shows_what_one_on_the_cpu_does() {
         for gpu in test_gpus("a_stream_on_a_gpu_shows_what_one_on_the_cpu_does") {
-            for method in MOVING {
+            for method in Method::ALL {
                 let mut on_gpu = engine(method);
                 on_gpu.use_gpu(&gpu);
                 let frames = shown(&mut on_gpu, |_| ());

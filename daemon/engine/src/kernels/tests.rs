@@ -11,6 +11,7 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 use super::*;
 use crate::backend::shader::{Binding, COLOR, COMMON, FIELD};
 use crate::params::FrameParams;
+use crate::warp::grid::TRIANGLE_BYTES;
 
 fn src() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
@@ -142,21 +143,26 @@ fn every_binding_is_what_the_table_says() {
     }
 }
 
+/// Members and bytes of a struct of a shader.
+fn structure<'a>(module: &'a naga::Module, name: &str) -> (&'a [naga::StructMember], u64) {
+    let found = module.types.iter().find_map(|(_, ty)| match &ty.inner {
+        naga::TypeInner::Struct { members, span } if ty.name.as_deref() == Some(name) => {
+            Some((members.as_slice(), u64::from(*span)))
+        }
+        _ => None,
+    });
+    found.unwrap_or_else(|| panic!("no struct {name}"))
+}
+
+#[test]
+fn a_triangle_takes_the_bytes_that_its_buffer_counts_with() {
+    assert_eq!(structure(&parse(&GRID), "Triangle").1, TRIANGLE_BYTES);
+}
+
 #[test]
 fn the_parameters_lie_where_the_shaders_read_them() {
     let module = parse(&BLEND);
-    let (members, span) = module
-        .types
-        .iter()
-        .find_map(|(_, ty)| match &ty.inner {
-            naga::TypeInner::Struct { members, span }
-                if ty.name.as_deref() == Some("FrameParams") =>
-            {
-                Some((members, *span))
-            }
-            _ => None,
-        })
-        .unwrap();
+    let (members, span) = structure(&module, "FrameParams");
     macro_rules! offsets {
         ($($member:ident),*) => {
             [$((stringify!($member), offset_of!(FrameParams, $member) as u32)),*]
@@ -171,12 +177,13 @@ fn the_parameters_lie_where_the_shaders_read_them() {
         phase,
         smooth_limit,
         one_cell,
-        has_depth
+        has_depth,
+        mesh_cells
     );
     let found: Vec<_> =
         members.iter().map(|member| (member.name.as_deref().unwrap(), member.offset)).collect();
     assert_eq!(found, expected);
-    assert_eq!(span as usize, size_of::<FrameParams>());
+    assert_eq!(span, size_of::<FrameParams>() as u64);
 }
 
 /// The number that a constant of a shader has.
@@ -195,6 +202,7 @@ fn constants_of_the_shaders_are_those_of_the_cpu() {
     use crate::color::ColorFormat::{Rgb10a2, Rgba8, Rgba16f};
     use crate::fill::far_side::{NO_CELL, NO_ROW};
     use crate::params::format_code;
+    use crate::warp::grid::{FARTHEST, LANES};
     use crate::warp::resolve::HOLE;
     use crate::warp::scatter::{MAX_CELLS, NO_SOURCE, SOURCE_BITS};
     let hole = u32::from(HOLE.x.cast_unsigned()) | u32::from(HOLE.y.cast_unsigned()) << 16;
@@ -204,6 +212,9 @@ fn constants_of_the_shaders_are_those_of_the_cpu() {
         ("NO_SOURCE", i64::from(NO_SOURCE)),
         ("NO_CELL", i64::from(NO_CELL)),
         ("NO_ROW", i64::from(NO_ROW)),
+        ("NO_TRIANGLE", i64::from(u32::MAX)),
+        ("LANES", i64::from(LANES)),
+        ("FARTHEST", i64::from(FARTHEST)),
         ("SOURCE_BITS", i64::from(SOURCE_BITS)),
         ("MAX_CELLS", i64::from(MAX_CELLS)),
         ("RGBA8", i64::from(format_code(Rgba8))),

@@ -34,6 +34,7 @@ use crate::params::{FrameParams, map_words};
 use crate::phase::Phase;
 use crate::warp::blend::BLEND;
 use crate::warp::gather::GATHER;
+use crate::warp::grid::{GRID, LANES, MeshWords, TRIANGLE_BYTES};
 use crate::warp::linear::LINEAR;
 use crate::warp::resolve::{CLASSIFY, RESOLVE};
 use crate::warp::scatter::{SCATTER, SOURCE};
@@ -55,7 +56,7 @@ fn frame_shaders(method: Method) -> &'static [&'static Shader] {
         Method::Hold => &[],
         Method::Blend => &[&BLEND],
         Method::Gather => &[&GATHER],
-        Method::Grid => &[],
+        Method::Grid => &[&GRID],
         Method::Linear => &[&SCATTER, &RESOLVE, &FAR_SIDE, &CLASSIFY, &LINEAR],
     }
 }
@@ -76,6 +77,7 @@ pub(crate) struct GpuBackend {
     download: Download,
     /// The field map as the shaders read it.
     tables: Vec<u32>,
+    mesh: MeshWords,
 }
 
 impl GpuBackend {
@@ -88,9 +90,6 @@ impl GpuBackend {
         format: ColorFormat,
         method: Method,
     ) -> Result<Self, GpuError> {
-        if method == Method::Grid {
-            return Err(GpuError::Refused { why: "no shader makes `grid`".to_owned() });
-        }
         let steps = |shaders: &[&'static Shader]| -> Result<Vec<Step>, GpuError> {
             shaders.iter().map(|shader| Ok((*shader, gpu.shader(shader, format)?))).collect()
         };
@@ -104,6 +103,7 @@ impl GpuBackend {
             color_upload: Upload::default(),
             download: Download::default(),
             tables: Vec::new(),
+            mesh: MeshWords::default(),
         })
     }
 
@@ -115,6 +115,9 @@ impl GpuBackend {
         let moves = !key.velocity.data().is_empty();
         if self.method == Method::Hold || (self.method != Method::Blend && !moves) {
             return Ok(());
+        }
+        if self.method == Method::Grid {
+            self.mesh.take_key(key);
         }
         let gpu = Arc::clone(&self.gpu);
         gpu.guard(|| {
@@ -128,22 +131,27 @@ impl GpuBackend {
     }
 
     fn send_field(&mut self, key: &KeyFrame, map: &FieldMap) -> Result<(), GpuError> {
-        map_words(map, &mut self.tables);
         let gpu = Arc::clone(&self.gpu);
         let mut commands = gpu.device.create_command_encoder(&Default::default());
         // A binding cannot be empty: without depth it is one word that no shader reads.
         let depth = key.depth.data().as_bytes();
         let depth = if depth.is_empty() { &[0; 4] } else { depth };
-        let parts = [
-            (Slot::Velocity, key.velocity.data().as_bytes()),
-            (Slot::Depth, depth),
-            (Slot::Tables, self.tables.as_bytes()),
-        ];
+        let parts: &[(Slot, &[u8])] = if self.method == Method::Grid {
+            let MeshWords { vertices, cuts, .. } = &self.mesh;
+            &[(Slot::Vertices, vertices.as_bytes()), (Slot::Cuts, cuts.as_bytes())]
+        } else {
+            map_words(map, &mut self.tables);
+            &[
+                (Slot::Velocity, key.velocity.data().as_bytes()),
+                (Slot::Depth, depth),
+                (Slot::Tables, self.tables.as_bytes()),
+            ]
+        };
         for (upload, (slot, bytes)) in self.field_upload.iter_mut().zip(parts) {
-            let target = self.planes.sized(&gpu, slot, bytes.len() as u64)?;
+            let target = self.planes.sized(&gpu, *slot, bytes.len() as u64)?;
             upload.write(&gpu, &mut commands, bytes, target)?;
         }
-        let params = FrameParams::new(key, map, Phase::ZERO);
+        let params = self.params(key, map, Phase::ZERO);
         self.make_room(&params)?;
         self.planes.write_params(&gpu, &params)?;
         dispatch(&gpu, &mut commands, &self.key_steps, &mut self.planes, &params)?;
@@ -165,13 +173,17 @@ impl GpuBackend {
         Ok(())
     }
 
-    /// Gives every plane on the field grid that the steps bind its size.
+    fn params(&self, key: &KeyFrame, map: &FieldMap, phase: Phase) -> FrameParams {
+        FrameParams { mesh_cells: self.mesh.cells, ..FrameParams::new(key, map, phase) }
+    }
+
+    /// Gives every plane that only shaders write its size.
     fn make_room(&mut self, params: &FrameParams) -> Result<(), GpuError> {
-        let cells = u64::from(params.cells[0]) * u64::from(params.cells[1]);
+        let area = |[width, height]: [u32; 2]| u64::from(width) * u64::from(height);
         for (shader, _) in self.key_steps.iter().chain(&self.frame_steps) {
             for slot in shader.bindings.iter().map(|binding| binding.slot()) {
-                match slot {
-                    Slot::Holes => self.planes.sized(&self.gpu, slot, 4)?,
+                let size = match slot {
+                    Slot::Holes => 4,
                     Slot::Held
                     | Slot::Near
                     | Slot::Top
@@ -180,14 +192,19 @@ impl GpuBackend {
                     | Slot::Origin
                     | Slot::StackedRows
                     | Slot::BesideColumns
-                    | Slot::Broken => self.planes.sized(&self.gpu, slot, 4 * cells)?,
+                    | Slot::Broken => 4 * area(params.cells),
+                    Slot::Triangles => 2 * TRIANGLE_BYTES * area(params.mesh_cells),
+                    Slot::Nearest | Slot::Shown => 4 * area(params.size),
                     Slot::Color
                     | Slot::Older
                     | Slot::Velocity
                     | Slot::Depth
                     | Slot::Tables
+                    | Slot::Vertices
+                    | Slot::Cuts
                     | Slot::Out => continue,
                 };
+                self.planes.sized(&self.gpu, slot, size)?;
             }
         }
         Ok(())
@@ -204,7 +221,7 @@ impl GpuBackend {
     ) -> Result<(), GpuError> {
         let gpu = Arc::clone(&self.gpu);
         gpu.guard(|| {
-            let params = FrameParams::new(frame.newest, frame.map, frame.phase);
+            let params = self.params(frame.newest, frame.map, frame.phase);
             let bytes = out.as_mut_bytes();
             let size = bytes.len() as u64;
             self.planes.sized(&gpu, Slot::Out, size)?;
@@ -237,6 +254,8 @@ fn dispatch(
                 Extent::Cells => params.cells,
                 Extent::CellColumns => [params.cells[0], 1],
                 Extent::CellRows => [params.cells[1], 1],
+                Extent::Triangles => [2 * params.mesh_cells[0], params.mesh_cells[1]],
+                Extent::TriangleLanes => [2 * LANES * params.mesh_cells[0], params.mesh_cells[1]],
             };
             pass.set_pipeline(pipeline);
             let [width, height] = entry.workgroup;

@@ -5,10 +5,11 @@ use super::*;
 use crate::backend::cpu::CpuBackend;
 use crate::key::Velocity;
 use crate::plane::{Plane, Rect};
-use crate::testing::{hash, key, map_of, noise, plane, pool};
+use crate::testing::{hash, map_of, noise, plane, pool};
+use crate::time::MonoTime;
 
 const FORMATS: [ColorFormat; 3] = [ColorFormat::Rgba8, ColorFormat::Rgb10a2, ColorFormat::Rgba16f];
-const WARPS: [Method; 2] = [Method::Gather, Method::Linear];
+const WARPS: [Method; 3] = [Method::Gather, Method::Grid, Method::Linear];
 
 /// A velocity of noise, up to `reach` pixels per axis; one in 64 is not trackable.
 fn velocity_noise(width: u32, height: u32, reach: i32, seed: u32) -> Plane<Velocity> {
@@ -35,6 +36,13 @@ fn depth_noise(width: u32, height: u32, seed: u32) -> Plane<u32> {
         2 => (1 << 20) + hash(x, y, seed) % (1 << 13),
         _ => hash(x, y, seed ^ 1),
     })
+}
+
+/// A key that moves, as decode leaves it: with a time that its motion points back to.
+fn key(color: ColorPlane, depth: Plane<u32>, velocity: Plane<Velocity>) -> KeyFrame {
+    let key = crate::testing::key(color, depth, velocity);
+    let content_time = MonoTime::from_ns(1);
+    KeyFrame { content_time, motion_from: Some(MonoTime::ZERO), ..key }
 }
 
 fn phases() -> impl Iterator<Item = Phase> {
@@ -153,6 +161,7 @@ fn every_adapter_warps_without_depth() {
             let color = noise(ColorFormat::Rgba8, 80, 60, seed);
             let key = key(color, Plane::default(), velocity_noise(40, 30, 15, seed));
             assert_same(&gpu, Method::Linear, &key, "no depth");
+            assert_same(&gpu, Method::Grid, &key, "no depth");
         }
     }
 }
@@ -164,7 +173,9 @@ fn every_adapter_fills_a_picture_that_moved_out_altogether() {
             let velocity =
                 plane(64, 48, |_, _| Velocity { x: velocity[0] * 32, y: velocity[1] * 32 });
             let key = key(noise(ColorFormat::Rgba8, 128, 96, 5), depth_noise(64, 48, 3), velocity);
-            assert_same(&gpu, Method::Linear, &key, "gone");
+            for method in WARPS {
+                assert_same(&gpu, method, &key, "gone");
+            }
         }
     }
 }
@@ -177,7 +188,9 @@ fn every_adapter_warps_a_picture_8192_pixels_wide() {
             depth_noise(8192, 6, 1),
             velocity_noise(8192, 6, 40, 2),
         );
-        assert_same(&gpu, Method::Linear, &key, "8192 wide");
+        for method in WARPS {
+            assert_same(&gpu, method, &key, "8192 wide");
+        }
     }
 }
 

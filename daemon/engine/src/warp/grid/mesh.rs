@@ -19,7 +19,7 @@ use crate::warp::displacement;
 
 /// Farthest way of a vertex, 1/16 px. Two vertices of a cell then stay within 1031 px of
 /// each other, and edge functions within 30 bits.
-pub(super) const FARTHEST: i32 = 504 * 16;
+pub const FARTHEST: i32 = 504 * 16;
 
 /// One vertex of the mesh over the key.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -131,6 +131,25 @@ impl Mesh {
                 depth: ids.map(|id| quad[id].depth).into_iter().fold(u32::MAX, u32::min),
             })
         })
+    }
+
+    /// Writes down vertices and cuts as the shader reads them; returns columns and rows of cells.
+    pub(super) fn write_words(
+        &self,
+        vertices: &mut Vec<[u32; 4]>,
+        cuts: &mut Vec<u32>,
+    ) -> [u32; 2] {
+        vertices.clear();
+        vertices.extend(self.vertices.iter().map(|vertex| {
+            let [x, y] = vertex.source.map(i32::cast_unsigned);
+            let Velocity { x: vx, y: vy } = vertex.velocity;
+            let velocity = u32::from(vx.cast_unsigned()) | u32::from(vy.cast_unsigned()) << 16;
+            [x, y, velocity, vertex.depth]
+        }));
+        cuts.clear();
+        cuts.extend(self.diagonals.iter().map(|cut| u32::from(*cut == Diagonal::Rising)));
+        [self.columns - 1, self.extents.len()]
+            .map(|count| u32::try_from(count).expect("a mesh is no finer than half of its field"))
     }
 
     #[cfg(test)]

@@ -24,7 +24,7 @@
 //! therefore not drawn at all, disocclusions are stretched by construction, and where no
 //! triangle is turned over each pixel has exactly one candidate and (3) needs no depth.
 //!
-//! Exact: integers only, and (3) does not depend on the order of drawing. Phase 0 and zero motion
+//! Exactness: `Exact`. Integers only, and (3) does not depend on the order of drawing. Phase 0 and zero motion
 //! give the key's bytes. Every quantity but one fits 32 bits: the texture gradient is one 64-bit
 //! quotient per triangle and axis, which a shader gets by shift and subtract.
 //!
@@ -37,12 +37,16 @@
 //! - a vertex moves at most 504 px, which keeps the edge functions inside 32 bits;
 //! - blur and its compensation are not part of the warp.
 
+mod gpu;
 mod mesh;
 mod pyramid;
 mod raster;
 #[cfg(test)]
 mod tests;
 mod triangle;
+
+pub use gpu::{GRID, LANES, MeshWords, TRIANGLE_BYTES};
+pub use mesh::FARTHEST;
 
 use crate::color::{ColorPlane, Texel};
 use crate::key::KeyFrame;
