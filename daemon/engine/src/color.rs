@@ -13,6 +13,8 @@ mod sse2;
 use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 use crate::plane::{Plane, Rect};
+#[cfg(target_arch = "x86_64")]
+use crate::simd::has_avx2;
 use crate::warp::sample::{Positions, sample};
 
 /// How the channels of a colour plane are stored.
@@ -147,7 +149,7 @@ impl Texel for Rgba8 {
 
     #[cfg(target_arch = "x86_64")]
     fn bilinear_run(top: &[Self], bottom: &[Self], fx: u32, fy: u32, out: &mut [Self]) {
-        let done = if is_x86_feature_detected!("avx2") {
+        let done = if has_avx2() {
             // SAFETY: the processor has AVX2, asked for just above.
             unsafe { avx2::bilinear_run(top, bottom, fx, fy, out) }
         } else {
@@ -161,7 +163,7 @@ impl Texel for Rgba8 {
     #[cfg(target_arch = "x86_64")]
     #[inline(always)]
     fn sample_each(plane: &Plane<Self>, valid: Rect, positions: &impl Positions, out: &mut [Self]) {
-        let done = if is_x86_feature_detected!("avx2") {
+        let done = if has_avx2() {
             // SAFETY: the processor has AVX2, asked for just above.
             unsafe { avx2::sample_each(plane, valid, positions, out) }
         } else {

@@ -23,8 +23,11 @@ use crate::phase::Phase;
 /// |v| <= 32767 and p <= 16384, so the product stays inside an i32.
 #[must_use]
 pub fn displacement(velocity: Velocity, phase: Phase) -> [i32; 2] {
-    if !velocity.is_trackable() {
-        return [0, 0];
-    }
+    if velocity.is_trackable() { moved(velocity, phase) } else { [0, 0] }
+}
+
+/// [`displacement`] of a velocity that is known.
+#[inline(always)]
+fn moved(velocity: Velocity, phase: Phase) -> [i32; 2] {
     [velocity.x, velocity.y].map(|v| (i32::from(v) * phase.q12() + 256) >> 9)
 }

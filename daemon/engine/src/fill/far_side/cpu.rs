@@ -7,6 +7,9 @@ use crate::bands::for_each_row;
 use crate::plane::Plane;
 use crate::warp::scatter::{NO_SOURCE, SourceField, source_of};
 
+/// Cells that are skipped together where none is a hole.
+const GROUP: usize = 32;
+
 /// Buffers of the search.
 #[derive(Clone, Debug, Default)]
 pub struct FarScratch {
@@ -80,23 +83,27 @@ pub fn far_side(
     );
 }
 
-/// For each cell, the last row so far, in the order of `rows`, that is resolved in its column.
+/// For each hole, the last row so far, in the order of `rows`, that is resolved in its column. The
+/// rest is unspecified.
 #[expect(clippy::cast_possible_truncation, reason = "a plane has at most 8192 rows")]
 fn sweep(splat: &Plane<u32>, rows: impl Iterator<Item = u32>, nearest: &mut Plane<u16>) {
-    let width = splat.width() as usize;
     nearest.resize(splat.width(), splat.height());
     let mut before = None;
     for y in rows {
-        let start = y as usize * width;
-        if let Some(before) = before {
-            nearest.data_mut().copy_within(before..before + width, start);
-        } else {
-            nearest.row_mut(y).fill(NO_ROW);
+        for (group, splats) in splat.row(y).chunks(GROUP).enumerate() {
+            if !splats.iter().fold(false, |any, splat| any | (*splat == NO_SOURCE)) {
+                continue;
+            }
+            let columns = (group * GROUP) as u32..;
+            for (x, _) in columns.zip(splats).filter(|(_, splat)| **splat == NO_SOURCE) {
+                let row = before.map_or(NO_ROW, |before| match splat.at(x, before) {
+                    NO_SOURCE => nearest.at(x, before),
+                    _ => before as u16,
+                });
+                nearest.row_mut(y)[x as usize] = row;
+            }
         }
-        for (row, &splat) in nearest.row_mut(y).iter_mut().zip(splat.row(y)) {
-            *row = if splat == NO_SOURCE { *row } else { y as u16 };
-        }
-        before = Some(start);
+        before = Some(y);
     }
 }
 

@@ -1,122 +1,126 @@
 //! Where the pixels of a row are read in smooth cells: (1) of [`super`].
 //!
 //! Displacement is interpolated between cell centres, down to the row once per cell and then along
-//! the row once per pixel, a block of pixels at a time.
+//! the row once per pixel. The cells of the whole row come first: what was just written in one
+//! width is slow to read in another.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
+
+use std::cell::RefCell;
 
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::__m256i;
 
 use super::cpu::Frame;
+use crate::simd::has_avx2;
 use crate::warp::sample::Positions;
 
-/// Pixels whose positions are computed before they are read.
-pub(super) const BLOCK: usize = 64;
 /// Pixels of one wide step.
 const LANES: usize = 8;
-/// Cells of a block: one more on either side, and what a wide step reads beyond the last.
-const CELLS: usize = BLOCK + LANES + 2;
 
-/// The velocities of the cells above and below a row of pixels.
-pub(super) struct Between<'a> {
-    frame: &'a Frame<'a>,
-    above: &'a [[i16; 2]],
-    below: &'a [[i16; 2]],
-    way_y: i32,
-    /// The block's first pixel, their number, and the cell before the first.
-    first: u32,
-    pixels: usize,
-    start: usize,
-    /// Displacements of the block's cells and of the right neighbour of the last, interpolated
-    /// down to the row, x and y; `count` of them hold.
-    cells: [[i32; CELLS]; 2],
-    count: usize,
+/// Displacements of the cells of a row, interpolated down to a row of pixels, x and y. The last
+/// one is repeated as often as a wide step reads beyond it.
+#[derive(Debug, Default)]
+pub(super) struct RowCells {
+    xs: Vec<i32>,
+    ys: Vec<i32>,
 }
 
-impl<'a> Between<'a> {
-    /// Of row `index_y` of the valid rectangle.
-    pub(super) fn new(frame: &'a Frame<'a>, index_y: u32) -> Self {
-        let (y, way) = frame.map.y.before(index_y);
+thread_local! {
+    /// Kept from row to row.
+    static CELLS: RefCell<RowCells> = RefCell::default();
+}
+
+/// Calls `work` with the cells for row `index_y` of the valid rectangle.
+#[inline(always)]
+pub(super) fn with_row_cells(frame: &Frame<'_>, index_y: u32, work: impl FnOnce(&RowCells)) {
+    // Taken and put back, as a closure given to the thread's storage is not made for AVX2.
+    let mut cells = CELLS.take();
+    cells.update(frame, index_y);
+    work(&cells);
+    CELLS.set(cells);
+}
+
+impl RowCells {
+    #[inline(always)]
+    fn update(&mut self, frame: &Frame<'_>, index_y: u32) {
         let carried = &frame.field.carried;
-        Self {
-            frame,
-            above: carried.row(y),
-            below: carried.row((y + 1).min(carried.height() - 1)),
-            way_y: way.cast_signed(),
-            first: 0,
-            pixels: 0,
-            start: 0,
-            cells: [[0; CELLS]; 2],
-            count: 1,
+        let (y, way) = frame.map.y.before(index_y);
+        let (above, below) = (carried.row(y), carried.row((y + 1).min(carried.height() - 1)));
+        let (phase, way) = (frame.phase.q12(), way.cast_signed());
+        let count = above.len();
+        for axis in [&mut self.xs, &mut self.ys] {
+            axis.resize(count + LANES, 0);
         }
-    }
-
-    /// Goes to the block of `pixels` pixels from `first` on.
-    #[inline(always)]
-    pub(super) fn go_to(&mut self, first: u32, pixels: usize) {
-        let map = &self.frame.map.x;
-        let last = first + pixels as u32 - 1;
-        let (start, end) = (map.before(first).0 as usize, map.before(last).0 as usize + 1);
-        let end = end.min(self.above.len() - 1);
-        let (phase, way_y) = (self.frame.phase.q12(), self.way_y);
-        let (above, below) = (&self.above[start..=end], &self.below[start..=end]);
-        let [xs, ys] = &mut self.cells;
-        for ((x, y), (above, below)) in xs.iter_mut().zip(ys).zip(above.iter().zip(below)) {
-            let shift = |v: i16| (i32::from(v) * phase + 256) >> 9;
-            *x = lerp(shift(above[0]), shift(below[0]), way_y);
-            *y = lerp(shift(above[1]), shift(below[1]), way_y);
-        }
-        (self.first, self.pixels, self.start) = (first, pixels, start);
-        self.count = end - start + 1;
-        for cells in &mut self.cells {
-            cells[self.count] = cells[self.count - 1];
-        }
-    }
-
-    /// The displacement of all pixels of the block, where it is the same.
-    #[inline(always)]
-    pub(super) fn shared(&self) -> Option<[i32; 2]> {
-        let shared = self.cells.map(|cells| cells[0]);
-        let differs = |axis: usize| {
-            let cells = &self.cells[axis][..self.count];
-            cells.iter().fold(0, |differs, cell| differs | (cell ^ shared[axis]))
+        #[cfg(target_arch = "x86_64")]
+        let done = if has_avx2() {
+            // SAFETY: the processor has AVX2, asked for just above.
+            unsafe { avx2::interpolate([above, below], phase, way, [&mut self.xs, &mut self.ys]) }
+        } else {
+            0
         };
-        (differs(0) | differs(1) == 0).then_some(shared)
+        #[cfg(not(target_arch = "x86_64"))]
+        let done = 0;
+        let cells = self.xs.iter_mut().zip(&mut self.ys).zip(above.iter().zip(below));
+        for ((x, y), (above, below)) in cells.skip(done) {
+            let shift = |v: i16| (i32::from(v) * phase + 256) >> 9;
+            *x = lerp(shift(above[0]), shift(below[0]), way);
+            *y = lerp(shift(above[1]), shift(below[1]), way);
+        }
+        for axis in [&mut self.xs, &mut self.ys] {
+            let last = axis[count - 1];
+            axis[count..].fill(last);
+        }
     }
 
-    /// (1): where the pixels of the block are read, of which `p_y` is y and `p_x` that of the
-    /// first, Q8. In broken cells the result is not used.
+    /// The displacement of `pixels` pixels from `first` on, where it is the same.
     #[inline(always)]
-    pub(super) fn positions(&self, p: [i32; 2]) -> BlockPositions<'_> {
-        let map = &self.frame.map.x;
-        BlockPositions {
-            cells: &self.cells,
-            start: self.start,
-            places: map.before_each(self.first, self.pixels),
-            p,
+    pub(super) fn shared(&self, frame: &Frame<'_>, first: u32, pixels: usize) -> Option<[i32; 2]> {
+        let map = &frame.map.x;
+        let (start, end) = (map.before(first).0, map.before(first + pixels as u32 - 1).0);
+        let cells = start as usize..end as usize + 2;
+        let shared = [self.xs[cells.start], self.ys[cells.start]];
+        let cells = self.xs[cells.clone()].iter().zip(&self.ys[cells]);
+        let differs = cells.fold(0, |differs, (x, y)| differs | (x ^ shared[0]) | (y ^ shared[1]));
+        (differs == 0).then_some(shared)
+    }
+
+    /// (1): where `pixels` pixels from `first` on are read. In broken cells it is not used.
+    #[inline(always)]
+    pub(super) fn positions<'a>(
+        &'a self,
+        frame: &'a Frame<'a>,
+        [first, index_y]: [u32; 2],
+        pixels: usize,
+    ) -> RowPositions<'a> {
+        let p = [frame.valid.x + first, frame.valid.y + index_y];
+        RowPositions {
+            xs: &self.xs,
+            ys: &self.ys,
+            places: frame.map.x.before_each(first, pixels),
+            p: p.map(|p| (p << 8).cast_signed()),
         }
     }
 }
 
-/// Where the pixels of a block are read.
-pub(super) struct BlockPositions<'a> {
-    /// Displacements of cells from number `start` on, x and y.
-    cells: &'a [[i32; CELLS]; 2],
-    start: usize,
+/// Where some pixels of a row are read.
+pub(super) struct RowPositions<'a> {
+    /// Displacements of the cells.
+    xs: &'a [i32],
+    ys: &'a [i32],
     /// For each pixel the cell before it and the way to the next one.
     places: &'a [[u16; 2]],
-    /// The first pixel.
+    /// Centre of the first pixel, Q8.
     p: [i32; 2],
 }
 
-impl Positions for BlockPositions<'_> {
+impl Positions for RowPositions<'_> {
     #[inline(always)]
     fn at(&self, i: usize) -> [i32; 2] {
         let [cell, way] = self.places[i];
-        let cell = usize::from(cell) - self.start;
-        let [dx, dy] = self.cells.map(|cells| lerp(cells[cell], cells[cell + 1], i32::from(way)));
+        let (cell, way) = (usize::from(cell), i32::from(way));
+        let [dx, dy] = [self.xs, self.ys].map(|axis| lerp(axis[cell], axis[cell + 1], way));
         [self.p[0] + ((i as i32) << 8) - dx, self.p[1] - dy]
     }
 

@@ -5,7 +5,7 @@ use super::fill::hole_pixel;
 use crate::color::Texel;
 use crate::key::Velocity;
 use crate::plane::Plane;
-use crate::warp::displacement;
+use crate::warp::moved;
 use crate::warp::resolve::HOLE;
 use crate::warp::sample::sample;
 
@@ -53,7 +53,7 @@ impl Candidates {
             for (&[x, y], &above) in row.iter().zip(above) {
                 let is_new = ([x, y] != left) & ([x, y] != above) & ([x, y] != [HOLE.x, HOLE.y]);
                 left = [x, y];
-                found.displacements[found.count] = displacement(Velocity { x, y }, frame.phase);
+                found.displacements[found.count] = moved(Velocity { x, y }, frame.phase);
                 found.count += usize::from(is_new);
             }
             above = row;
@@ -62,29 +62,29 @@ impl Candidates {
     }
 
     /// Where in the key the surface is that comes to `p`, if one does.
+    ///
+    /// Whether a candidate is good is as random as the edges that broken cells lie on, so that
+    /// nothing branches on it.
     #[inline(always)]
     fn shown(&self, frame: &Frame<'_>, p: [i32; 2]) -> Option<[i32; 2]> {
-        let at = |[dx, dy]: [i32; 2]| [p[0] - dx, p[1] - dy];
         // Of candidates that do not come to p: no depth, and no error is larger.
-        let (mut depths, mut errors) = ([0; NEIGHBOURS], [i32::MAX; NEIGHBOURS]);
+        let mut found = [(0, i32::MAX); NEIGHBOURS];
         let mut nearest = 0;
-        let candidates = self.displacements[..self.count].iter();
-        for ((&[dx, dy], depth), error) in candidates.zip(&mut depths).zip(&mut errors) {
-            let Some(surface) = frame.surface_at(at([dx, dy])) else { continue };
-            let [near_dx, near_dy] = displacement(surface.velocity, frame.phase);
-            let apart = (near_dx - dx).abs() + (near_dy - dy).abs();
-            if apart <= frame.one_cell {
-                (*depth, *error) = (surface.depth, apart);
-                nearest = nearest.max(surface.depth);
-            }
+        let candidates = &self.displacements[..self.count.min(NEIGHBOURS)];
+        for (&[dx, dy], found) in candidates.iter().zip(&mut found) {
+            let (surface, is_inside) = frame.surface_near([p[0] - dx, p[1] - dy]);
+            let [near_dx, near_dy] = moved(surface.velocity, frame.phase);
+            let error = (near_dx - dx).abs() + (near_dy - dy).abs();
+            let comes = is_inside & (error <= frame.one_cell);
+            *found = if comes { (surface.depth, error) } else { (0, i32::MAX) };
+            nearest = nearest.max(found.0);
         }
-        let mut best = (i32::MAX, None);
-        let found = depths.iter().zip(&errors).zip(&self.displacements[..self.count]);
-        for ((&depth, &error), &displacement) in found {
-            if depth >= nearest - (nearest >> 8) && error < best.0 {
-                best = (error, Some(displacement));
-            }
+        let (mut best, mut smallest) = (0, i32::MAX);
+        for (i, &(depth, error)) in found[..candidates.len()].iter().enumerate() {
+            let is_better = (depth >= nearest - (nearest >> 8)) & (error < smallest);
+            (best, smallest) = if is_better { (i, error) } else { (best, smallest) };
         }
-        best.1.map(at)
+        let [dx, dy] = self.displacements[best];
+        (smallest < i32::MAX).then_some([p[0] - dx, p[1] - dy])
     }
 }

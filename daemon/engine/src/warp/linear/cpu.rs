@@ -3,7 +3,7 @@
 use rayon::ThreadPool;
 
 use super::LinearScratch;
-use super::between::{BLOCK, Between};
+use super::between::with_row_cells;
 use super::broken::broken_cell;
 use crate::bands::for_each_row;
 use crate::color::{ColorPlane, Texel};
@@ -77,6 +77,8 @@ fn gather<T: Texel>(pool: &ThreadPool, frame: &Frame<'_>, color: &Plane<T>, out:
     );
 }
 
+/// Pixels that are read together where they all move alike.
+const BLOCK: usize = 64;
 /// Cells whose classes are looked at together.
 const CLASSES: usize = 32;
 
@@ -85,28 +87,33 @@ const CLASSES: usize = 32;
 fn gather_row<T: Texel>(frame: &Frame<'_>, color: &Plane<T>, index_y: u32, row: &mut [T]) {
     let cell_y = frame.map.y.cell_of(index_y);
     let class = frame.field.class.row(cell_y);
-    let p_y = ((frame.valid.y + index_y) << 8).cast_signed();
-    let mut between = Between::new(frame, index_y);
     // Wide steps hold the cells of grids that are no finer than colour.
     let is_finer = frame.map.x.cells() > frame.map.x.pixels();
-    for (block, texels) in (0..).zip(row.chunks_mut(BLOCK)) {
-        let first = block * BLOCK as u32;
-        let p_x = ((frame.valid.x + first) << 8).cast_signed();
-        between.go_to(first, texels.len());
-        if let Some([dx, dy]) = between.shared() {
-            sample_run(color, frame.valid, [p_x - dx, p_y - dy], texels);
-        } else {
-            let positions = between.positions([p_x, p_y]);
-            if is_finer {
-                for (i, texel) in texels.iter_mut().enumerate() {
-                    let [x, y] = positions.at(i);
-                    *texel = sample(color, frame.valid, x, y);
+    with_row_cells(
+        frame,
+        index_y,
+        #[inline(always)]
+        |cells| {
+            for (block, texels) in (0..).zip(row.chunks_mut(BLOCK)) {
+                let first = block * BLOCK as u32;
+                let p = [frame.valid.x + first, frame.valid.y + index_y];
+                if let Some([dx, dy]) = cells.shared(frame, first, texels.len()) {
+                    let [p_x, p_y] = p.map(|p| (p << 8).cast_signed());
+                    sample_run(color, frame.valid, [p_x - dx, p_y - dy], texels);
+                    continue;
                 }
-            } else {
-                T::sample_each(color, frame.valid, &positions, texels);
+                let positions = cells.positions(frame, [first, index_y], texels.len());
+                if is_finer {
+                    for (i, texel) in texels.iter_mut().enumerate() {
+                        let [x, y] = positions.at(i);
+                        *texel = sample(color, frame.valid, x, y);
+                    }
+                } else {
+                    T::sample_each(color, frame.valid, &positions, texels);
+                }
             }
-        }
-    }
+        },
+    );
     for (group, classes) in class.chunks(CLASSES).enumerate() {
         if !classes.iter().fold(false, |any, class| any | (*class == CellClass::Broken)) {
             continue;
@@ -125,17 +132,24 @@ impl Frame<'_> {
     /// The surface that the key shows at the pixel nearest to `q`; None outside.
     #[inline(always)]
     pub(super) fn surface_at(&self, q: [i32; 2]) -> Option<Surface> {
+        let (surface, is_inside) = self.surface_near(q);
+        is_inside.then_some(surface)
+    }
+
+    /// The surface that the key shows at the pixel of the valid rectangle nearest to `q`, and
+    /// whether `q` lies on that pixel.
+    #[inline(always)]
+    pub(super) fn surface_near(&self, q: [i32; 2]) -> (Surface, bool) {
         let x = ((q[0] + 128) >> 8) - self.valid.x.cast_signed();
         let y = ((q[1] + 128) >> 8) - self.valid.y.cast_signed();
-        let (x, y) = (u32::try_from(x).ok()?, u32::try_from(y).ok()?);
-        if x >= self.valid.width || y >= self.valid.height {
-            return None;
-        }
-        let (cell_x, cell_y) = (self.map.x.cell_of(x), self.map.y.cell_of(y));
+        let last = [self.valid.width, self.valid.height].map(|length| length.cast_signed() - 1);
+        let inside = [x.clamp(0, last[0]), y.clamp(0, last[1])];
+        let [column, row] = inside.map(i32::cast_unsigned);
         let source = &self.field.source;
-        Some(Surface {
-            depth: source.depth.at(cell_x, cell_y),
-            velocity: source.velocity.at(cell_x, cell_y),
-        })
+        let (cell_x, cell_y) = (self.map.x.cell_of(column), self.map.y.cell_of(row));
+        let cell = cell_y as usize * source.depth.width() as usize + cell_x as usize;
+        let surface =
+            Surface { depth: source.depth.data()[cell], velocity: source.velocity.data()[cell] };
+        (surface, inside == [x, y])
     }
 }

@@ -6,31 +6,70 @@
 
 use std::arch::x86_64::{
     __m256i, _mm256_add_epi32, _mm256_and_si256, _mm256_loadu_si256, _mm256_mullo_epi32,
-    _mm256_permutevar8x32_epi32, _mm256_set1_epi32, _mm256_setr_epi32, _mm256_srai_epi32,
-    _mm256_srli_epi32, _mm256_sub_epi32,
+    _mm256_permutevar8x32_epi32, _mm256_set1_epi32, _mm256_setr_epi32, _mm256_slli_epi32,
+    _mm256_srai_epi32, _mm256_srli_epi32, _mm256_storeu_si256, _mm256_sub_epi32,
 };
 
-use super::{BlockPositions, CELLS, LANES};
+use super::{LANES, RowPositions};
+
+/// Displacements of the cells of two rows at `phase`, Q12, interpolated `way` of the way from the
+/// first to the second, into `moved`, as many as whole steps hold; returns their number.
+///
+/// # Panics
+/// If the rows are not of one length, or `moved` is shorter.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) fn interpolate(
+    rows: [&[[i16; 2]]; 2],
+    phase: i32,
+    way: i32,
+    [xs, ys]: [&mut [i32]; 2],
+) -> usize {
+    let [phase, way] = [phase, way].map(|factor| _mm256_set1_epi32(factor));
+    let half = _mm256_set1_epi32(256);
+    let moved =
+        |v: __m256i| _mm256_srai_epi32(_mm256_add_epi32(_mm256_mullo_epi32(v, phase), half), 9);
+    let [above, below] = rows.map(|row| row.as_chunks::<LANES>().0);
+    assert_eq!(above.len(), below.len(), "rows of one length");
+    let (xs, ys) = (xs.as_chunks_mut::<LANES>().0, ys.as_chunks_mut::<LANES>().0);
+    let (xs, ys) = (&mut xs[..above.len()], &mut ys[..above.len()]);
+    for (i, (above, below)) in above.iter().zip(below).enumerate() {
+        // SAFETY: each holds 8 times two values of 16 bits, and the loads need no alignment.
+        let rows = [above, below].map(|row| unsafe { _mm256_loadu_si256(row.as_ptr().cast()) });
+        let lerp = |[above, below]: [__m256i; 2]| {
+            let part = _mm256_mullo_epi32(_mm256_sub_epi32(below, above), way);
+            let part = _mm256_srai_epi32(_mm256_add_epi32(part, _mm256_set1_epi32(128)), 8);
+            _mm256_add_epi32(above, part)
+        };
+        let x = lerp(rows.map(|v| moved(_mm256_srai_epi32(_mm256_slli_epi32(v, 16), 16))));
+        let y = lerp(rows.map(|v| moved(_mm256_srai_epi32(v, 16))));
+        // SAFETY: both hold 8 values of 32 bits, and the stores need no alignment.
+        unsafe {
+            _mm256_storeu_si256(xs[i].as_mut_ptr().cast(), x);
+            _mm256_storeu_si256(ys[i].as_mut_ptr().cast(), y);
+        }
+    }
+    above.len() * LANES
+}
 
 /// Where eight pixels from `i` on are read. Grids have at most as many cells as pixels.
 ///
 /// # Panics
-/// If the block has fewer pixels.
+/// If there are fewer pixels.
 #[inline]
 #[target_feature(enable = "avx2")]
-pub(super) fn positions(block: &BlockPositions<'_>, i: usize) -> [__m256i; 2] {
+pub(super) fn positions(row: &RowPositions<'_>, i: usize) -> [__m256i; 2] {
     let places: &[[u16; 2]; LANES] =
-        block.places[i..].first_chunk().expect("the block has 8 pixels from i on");
+        row.places[i..].first_chunk().expect("there are 8 pixels from i on");
     let first = usize::from(places[0][0]);
     // SAFETY: `places` holds 8 times two values of 16 bits, and the load needs no alignment.
     let places = unsafe { _mm256_loadu_si256(places.as_ptr().cast()) };
     let cell = _mm256_and_si256(places, _mm256_set1_epi32(0xffff));
     let cell = _mm256_sub_epi32(cell, _mm256_set1_epi32(first as i32));
     let way = _mm256_srli_epi32(places, 16);
-    let displacement = |cells: &[i32; CELLS]| {
-        let around: &[i32; LANES + 1] = cells[first - block.start..]
-            .first_chunk()
-            .expect("cells reach a step beyond the block");
+    let displacement = |cells: &[i32]| {
+        let around: &[i32; LANES + 1] =
+            cells[first..].first_chunk().expect("cells reach a step beyond the last");
         // SAFETY: both loads are of 8 of the 9 values of 32 bits, and need no alignment.
         let (left, right) = unsafe {
             (
@@ -45,18 +84,20 @@ pub(super) fn positions(block: &BlockPositions<'_>, i: usize) -> [__m256i; 2] {
         _mm256_add_epi32(left, part)
     };
     let steps = _mm256_setr_epi32(0, 0x100, 0x200, 0x300, 0x400, 0x500, 0x600, 0x700);
-    let x = _mm256_add_epi32(_mm256_set1_epi32(block.p[0] + ((i as i32) << 8)), steps);
+    let x = _mm256_add_epi32(_mm256_set1_epi32(row.p[0] + ((i as i32) << 8)), steps);
     [
-        _mm256_sub_epi32(x, displacement(&block.cells[0])),
-        _mm256_sub_epi32(_mm256_set1_epi32(block.p[1]), displacement(&block.cells[1])),
+        _mm256_sub_epi32(x, displacement(row.xs)),
+        _mm256_sub_epi32(_mm256_set1_epi32(row.p[1]), displacement(row.ys)),
     ]
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{BLOCK, Positions as _};
     use super::*;
     use crate::testing::hash;
+    use crate::warp::sample::Positions as _;
+
+    const PIXELS: usize = 64;
 
     #[test]
     fn eight_positions_equal_those_one_by_one() {
@@ -66,24 +107,21 @@ mod tests {
         for case in 0..2000 {
             let displacement =
                 |i: usize, axis| (hash(case, i as u32, axis) >> 11) as i32 - 0x10_0000;
-            let cells = [0, 1].map(|axis| std::array::from_fn(|i| displacement(i, axis)));
-            let (start, first) = (5, (hash(case, 0, 2) % 64) as usize);
-            let places: [[u16; 2]; BLOCK] = std::array::from_fn(|i| {
-                let cell = start + (first + i * (case as usize % 8) / 7).min(BLOCK);
+            let [xs, ys] = [0, 1]
+                .map(|axis| (0..2 * PIXELS + 8).map(|i| displacement(i, axis)).collect::<Vec<_>>());
+            let first = (hash(case, 0, 2) % 64) as usize;
+            let places: [[u16; 2]; PIXELS] = std::array::from_fn(|i| {
+                let cell = first + i * (case as usize % 8) / 7;
                 [cell as u16, (hash(case, i as u32, 3) & 0xff) as u16]
             });
-            let block = BlockPositions { cells: &cells, start, places: &places, p: [700, -30] };
-            for i in 0..=BLOCK - LANES {
+            let row = RowPositions { xs: &xs, ys: &ys, places: &places, p: [700, -30] };
+            for i in 0..=PIXELS - LANES {
                 // SAFETY: the processor has AVX2, asked for above.
-                let together = unsafe { positions(&block, i) };
+                let together = unsafe { positions(&row, i) };
                 // SAFETY: 8 values of 32 bits are as large as a register.
                 let [xs, ys]: [[i32; LANES]; 2] = unsafe { std::mem::transmute(together) };
                 for lane in 0..LANES {
-                    assert_eq!(
-                        [xs[lane], ys[lane]],
-                        block.at(i + lane),
-                        "case {case}, {i}, {lane}"
-                    );
+                    assert_eq!([xs[lane], ys[lane]], row.at(i + lane), "case {case}, {i}, {lane}");
                 }
             }
         }
