@@ -1,14 +1,18 @@
 //! Prints milliseconds per key and per in-between frame, by method and size.
 //!
-//! Usage: `cargo run --release -p foreframe-engine --example time_methods [-- THREADS [METHOD]]`
+//! Usage: `cargo run --release -p foreframe-engine --example time_methods
+//! [-- THREADS [METHOD|all [cpu|gpu:NAME]]]`
 //!
 //! Colour rgba8, depth f32 and motion rg16f at half resolution. The scene is a slanted ground that
 //! the camera moves over and a grid of nearer tiles that move across it: everything moves by
 //! fractions of a pixel, and about a tenth of the picture is edges. Medians over the frames.
 
 use std::num::NonZeroUsize;
+use std::sync::Arc;
 use std::time::Instant;
 
+use foreframe_engine::backend::choice::{BackendChoice, choose};
+use foreframe_engine::backend::gpu::{Gpu, adapters};
 use foreframe_engine::format::{
     CameraMotion, DepthConvention, DepthFormat, DepthMeaning, MotionConvention, MotionDirection,
     MotionFormat, MotionUnit,
@@ -75,6 +79,7 @@ fn time(
     method: Method,
     threads: NonZeroUsize,
     still: bool,
+    gpu: Option<&Arc<Gpu>>,
 ) -> [[f64; 2]; 2] {
     let format = StreamFormat {
         depth: Some(DepthConvention { format: DepthFormat::F32, meaning: DepthMeaning::Reversed }),
@@ -95,6 +100,9 @@ fn time(
         worker_started: || (),
     };
     let mut engine = Engine::new(format, config);
+    if let Some(gpu) = gpu {
+        engine.use_gpu(gpu);
+    }
     let planes = planes(width, height, still);
     let plane = |bytes, width: u32, height: u32, bytes_per_pixel: u32| PlaneInput {
         bytes,
@@ -127,7 +135,17 @@ fn time(
             frames.push(report.work.as_ms_f64());
         }
     }
+    if let Some(why) = &engine.backend().fell_back {
+        println!("the CPU took over: {why}");
+    }
     [summary(keys), summary(frames)]
+}
+
+fn open(choice: &BackendChoice) -> Option<Arc<Gpu>> {
+    let adapters = adapters();
+    let facts: Vec<_> = adapters.iter().map(|adapter| adapter.facts.clone()).collect();
+    let chosen = choose(choice, &facts, None).expect("an adapter that exists");
+    chosen.adapter.map(|index| Gpu::open(&adapters[index]).expect("an adapter that opens"))
 }
 
 fn main() {
@@ -135,14 +153,17 @@ fn main() {
     let threads = threads.unwrap_or(NonZeroUsize::MIN.saturating_add(1));
     println!("threads {threads}; median and minimum");
     println!("{:10} {:14} {:>13} {:>13}", "size", "method", "ms/key", "ms/frame");
-    let only = std::env::args().nth(2);
+    let only = std::env::args().nth(2).filter(|only| only != "all");
+    let backend = std::env::args().nth(3).unwrap_or_else(|| "cpu".to_owned());
+    let gpu = open(&backend.parse().expect("a backend"));
+    println!("backend {}", gpu.as_ref().map_or("cpu", |gpu| gpu.name()));
     for (width, height) in [(1280, 720), (1920, 1080)] {
         let cases = Method::ALL.map(|method| (method, false));
         for (method, still) in cases.into_iter().chain([(Method::Linear, true)]) {
             if only.as_ref().is_some_and(|only| only != method.name()) {
                 continue;
             }
-            let [key, frame] = time(width, height, method, threads, still);
+            let [key, frame] = time(width, height, method, threads, still, gpu.as_ref());
             let name = format!("{}{}", method.name(), if still { " (still)" } else { "" });
             let size = format!("{width}x{height}");
             println!(
