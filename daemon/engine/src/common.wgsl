@@ -24,6 +24,9 @@ const NO_SOURCE: u32 = 0xffffffffu;
 const NO_CELL: u32 = 0xffffffffu;
 const SOURCE_BITS: u32 = 25u;
 const MAX_CELLS: u32 = 0x1ffffffu;
+// Broken cells of a workgroup, and workgroups of a row of them.
+const BROKEN_GROUP: u32 = 64u;
+const GROUPS_OF_A_ROW: u32 = 1024u;
 
 fn velocity_of(word: u32) -> vec2<i32> {
     return vec2<i32>(bitcast<i32>(word << 16u) >> 16u, bitcast<i32>(word) >> 16u);

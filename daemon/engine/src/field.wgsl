@@ -1,6 +1,6 @@
 // The map between pixels and cells of the field grid, from the tables of `field.rs`:
-// one word per column of the valid rectangle, one per row, then the centres of the cells' columns
-// and of their rows. Expects a binding `tables`.
+// one word per column of the valid rectangle, one per row; the centres of the cells' columns and of
+// their rows; the first pixels of both, and behind each the end. Expects a binding `tables`.
 
 struct Place {
     // The cell that holds the pixel.
@@ -29,5 +29,20 @@ fn centre(cell: vec2<u32>) -> vec2<i32> {
     return vec2<i32>(
         bitcast<i32>(tables[centres + cell.x]),
         bitcast<i32>(tables[centres + params.cells.x + cell.y]),
+    );
+}
+
+// First pixel of a cell and the end, counted from the valid rectangle's first.
+struct PixelsOfCell {
+    first: vec2<u32>,
+    end: vec2<u32>,
+}
+
+fn pixels_of(cell: vec2<u32>) -> PixelsOfCell {
+    let columns = params.valid_size.x + params.valid_size.y + params.cells.x + params.cells.y;
+    let rows = columns + params.cells.x + 1u;
+    return PixelsOfCell(
+        vec2<u32>(tables[columns + cell.x], tables[rows + cell.y]),
+        vec2<u32>(tables[columns + cell.x + 1u], tables[rows + cell.y + 1u]),
     );
 }

@@ -73,7 +73,7 @@ pub const fn format_code(format: ColorFormat) -> u32 {
 }
 
 /// The words of `field.wgsl`'s tables: one per column of the valid rectangle, one per row, then the
-/// centres of the columns and of the rows of cells.
+/// centres of the columns and of the rows of cells, then the first pixels of both with the end.
 ///
 /// A pixel's word holds the cell before it in bits 0 to 15, the way to the next one in bits 16 to
 /// 23, and above them what is to be added for the cell that holds the pixel, 0 or 1.
@@ -85,6 +85,10 @@ pub fn map_words(map: &FieldMap, words: &mut Vec<u32>) {
     }
     for axis in axes {
         words.extend((0..axis.cells()).map(|cell| axis.centre(cell).cast_unsigned()));
+    }
+    for axis in axes {
+        words.extend((0..axis.cells() as usize).map(|cell| axis.pixels_of(cell).start as u32));
+        words.push(axis.pixels());
     }
 }
 
@@ -106,7 +110,7 @@ mod tests {
             map.update(Rect { x: 3, y: 0, width: pixels, height: 1 }, [cells, 1], [offset, 0]);
             let mut words = Vec::new();
             map_words(&map, &mut words);
-            assert_eq!(words.len() as u32, pixels + 1 + cells + 1);
+            assert_eq!(words.len() as u32, pixels + 1 + cells + 1 + cells + 1 + 2);
             for index in 0..pixels {
                 let word = words[index as usize];
                 assert!(word >> 24 <= 1, "pixel {index} of {pixels}");

@@ -39,6 +39,10 @@ pub enum Extent {
     CellColumns,
     /// Each row of the field grid.
     CellRows,
+    /// Each cell that [`Slot::Broken`] lists; it begins with the groups of the dispatch.
+    BrokenCells,
+    /// Nothing: there is one alone.
+    One,
     /// Each triangle of the mesh.
     Triangles,
     /// [`crate::warp::grid::LANES`] for each triangle of the mesh, side by side.
@@ -95,7 +99,7 @@ pub enum Slot {
     StackedRows,
     /// Nearest resolved columns left and right of a cell.
     BesideColumns,
-    /// Class of a cell.
+    /// The broken cells.
     Broken,
     /// Vertices of the mesh.
     Vertices,

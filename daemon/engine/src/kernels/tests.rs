@@ -212,6 +212,8 @@ fn constants_of_the_shaders_are_those_of_the_cpu() {
         ("NO_SOURCE", i64::from(NO_SOURCE)),
         ("NO_CELL", i64::from(NO_CELL)),
         ("NO_ROW", i64::from(NO_ROW)),
+        ("BROKEN_GROUP", i64::from(LINEAR.entries[1].workgroup[0])),
+        ("GROUPS_OF_A_ROW", 1024),
         ("NO_TRIANGLE", i64::from(u32::MAX)),
         ("LANES", i64::from(LANES)),
         ("FARTHEST", i64::from(FARTHEST)),

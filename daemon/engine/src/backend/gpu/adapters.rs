@@ -73,8 +73,12 @@ fn needed() -> wgpu::Limits {
 
 /// What the adapter lacks, if anything.
 fn unusable(adapter: &wgpu::Adapter) -> Option<String> {
-    if !adapter.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS) {
+    let flags = adapter.get_downlevel_capabilities().flags;
+    if !flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS) {
         return Some("no compute shaders".to_owned());
+    }
+    if !flags.contains(wgpu::DownlevelFlags::INDIRECT_EXECUTION) {
+        return Some("no indirect dispatch".to_owned());
     }
     let mut lacks = Vec::new();
     needed().check_limits_with_fail_fn(&adapter.limits(), false, |limit, needed, found| {

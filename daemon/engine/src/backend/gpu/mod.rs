@@ -61,6 +61,9 @@ fn frame_shaders(method: Method) -> &'static [&'static Shader] {
     }
 }
 
+/// Words of [`Slot::Broken`] before the cells.
+const BROKEN_HEADER: u64 = 4;
+
 /// A shader of a method, ready to run.
 type Step = (&'static Shader, Arc<Compiled>);
 
@@ -154,7 +157,7 @@ impl GpuBackend {
         let params = self.params(key, map, Phase::ZERO);
         self.make_room(&params)?;
         self.planes.write_params(&gpu, &params)?;
-        dispatch(&gpu, &mut commands, &self.key_steps, &mut self.planes, &params)?;
+        dispatch(&gpu, &mut commands, &self.key_steps, &self.planes, &params)?;
         let submission = gpu.queue.submit([commands.finish()]);
         for upload in &mut self.field_upload {
             upload.submitted(&submission);
@@ -184,6 +187,7 @@ impl GpuBackend {
             for slot in shader.bindings.iter().map(|binding| binding.slot()) {
                 let size = match slot {
                     Slot::Holes => 4,
+                    Slot::Broken => 4 * (BROKEN_HEADER + area(params.cells)),
                     Slot::Held
                     | Slot::Near
                     | Slot::Top
@@ -191,8 +195,7 @@ impl GpuBackend {
                     | Slot::Carried
                     | Slot::Origin
                     | Slot::StackedRows
-                    | Slot::BesideColumns
-                    | Slot::Broken => 4 * area(params.cells),
+                    | Slot::BesideColumns => 4 * area(params.cells),
                     Slot::Triangles => 2 * TRIANGLE_BYTES * area(params.mesh_cells),
                     Slot::Nearest | Slot::Shown => 4 * area(params.size),
                     Slot::Color
@@ -227,7 +230,7 @@ impl GpuBackend {
             self.planes.sized(&gpu, Slot::Out, size)?;
             self.planes.write_params(&gpu, &params)?;
             let mut commands = gpu.device.create_command_encoder(&Default::default());
-            dispatch(&gpu, &mut commands, &self.frame_steps, &mut self.planes, &params)?;
+            dispatch(&gpu, &mut commands, &self.frame_steps, &self.planes, &params)?;
             let made = self.planes.sized(&gpu, Slot::Out, size)?;
             self.download.copy(&gpu, &mut commands, made, size);
             let submission = gpu.queue.submit([commands.finish()]);
@@ -241,7 +244,7 @@ fn dispatch(
     gpu: &Gpu,
     commands: &mut wgpu::CommandEncoder,
     steps: &[Step],
-    planes: &mut Planes,
+    planes: &Planes,
     params: &FrameParams,
 ) -> Result<(), GpuError> {
     for (shader, compiled) in steps {
@@ -254,6 +257,12 @@ fn dispatch(
                 Extent::Cells => params.cells,
                 Extent::CellColumns => [params.cells[0], 1],
                 Extent::CellRows => [params.cells[1], 1],
+                Extent::One => [1, 1],
+                Extent::BrokenCells => {
+                    pass.set_pipeline(pipeline);
+                    pass.dispatch_workgroups_indirect(planes.held(Slot::Broken)?, 0);
+                    continue;
+                }
                 Extent::Triangles => [2 * params.mesh_cells[0], params.mesh_cells[1]],
                 Extent::TriangleLanes => [2 * LANES * params.mesh_cells[0], params.mesh_cells[1]],
             };

@@ -37,10 +37,17 @@ impl Planes {
                 size,
                 usage: wgpu::BufferUsages::STORAGE
                     | wgpu::BufferUsages::COPY_DST
-                    | wgpu::BufferUsages::COPY_SRC,
+                    | wgpu::BufferUsages::COPY_SRC
+                    | wgpu::BufferUsages::INDIRECT,
                 mapped_at_creation: false,
             })
         }))
+    }
+
+    /// The buffer of `slot`, which is there.
+    pub(super) fn held(&self, slot: Slot) -> Result<&wgpu::Buffer, GpuError> {
+        let held = self.planes[slot as usize].as_ref();
+        held.ok_or_else(|| GpuError::Refused { why: format!("{slot:?} has no buffer yet") })
     }
 
     /// Lets two planes change places.

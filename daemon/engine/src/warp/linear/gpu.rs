@@ -16,5 +16,8 @@ pub const LINEAR: Shader = Shader {
         Binding::Read(Slot::Tables),
         Binding::Write(Slot::Out),
     ],
-    entries: &[Entry::tiles("warp_linear", Extent::Pixels)],
+    entries: &[
+        Entry::tiles("warp_linear", Extent::Pixels),
+        Entry::lines("warp_broken", Extent::BrokenCells),
+    ],
 };

@@ -5,13 +5,14 @@
 // Of the key, as the scatter read them.
 @group(0) @binding(2) var<storage, read> held: array<u32>;
 @group(0) @binding(3) var<storage, read> near: array<u32>;
-// Of the cells of this frame: velocity, source or far side of a hole, class.
+// Of the cells of this frame: velocity, source or far side of a hole, and which are broken.
 @group(0) @binding(4) var<storage, read> carried: array<u32>;
 @group(0) @binding(5) var<storage, read> origin: array<u32>;
 @group(0) @binding(6) var<storage, read> broken: array<u32>;
 @group(0) @binding(7) var<storage, read> tables: array<u32>;
 @group(0) @binding(8) var<storage, read_write> out: array<u32>;
 
+// (1) everywhere; what is wrong in broken cells is made anew by `warp_broken`, and only there.
 @compute @workgroup_size(16, 16)
 fn warp_linear(@builtin(global_invocation_id) id: vec3<u32>) {
     let pixel = id.xy;
@@ -23,14 +24,26 @@ fn warp_linear(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let index = pixel - params.valid_start;
-    let x = place_x(index.x);
-    let y = place_y(index.y);
     let p = vec2<i32>(pixel << vec2<u32>(8u));
-    let cell = vec2<u32>(x.cell, y.cell);
-    if broken[cell_index(cell)] == 0u {
-        write_out(pixel, sample(p - between(x, y)));
-    } else {
-        write_out(pixel, broken_pixel(cell, p));
+    write_out(pixel, sample(p - between(place_x(index.x), place_y(index.y))));
+}
+
+// An invocation for each broken cell.
+@compute @workgroup_size(64, 1)
+fn warp_broken(@builtin(global_invocation_id) id: vec3<u32>) {
+    let place = id.y * GROUPS_OF_A_ROW * BROKEN_GROUP + id.x;
+    if place >= broken[3] {
+        return;
+    }
+    let i = broken[4u + place];
+    let cell = vec2<u32>(i % params.cells.x, i / params.cells.x);
+    let pixels = pixels_of(cell);
+    for (var y = pixels.first.y; y < pixels.end.y; y++) {
+        for (var x = pixels.first.x; x < pixels.end.x; x++) {
+            let pixel = params.valid_start + vec2<u32>(x, y);
+            let p = vec2<i32>(pixel << vec2<u32>(8u));
+            write_out(pixel, sample(broken_place(cell, p)));
+        }
     }
 }
 
@@ -70,8 +83,8 @@ fn surface_at(q: vec2<i32>) -> Surface {
     return Surface(true, near[i], held[i]);
 }
 
-// (2), and where it finds nothing, (3) and (4).
-fn broken_pixel(cell: vec2<u32>, p: vec2<i32>) -> Texel {
+// Where in the key a pixel of a broken cell is read: (2), and where that finds nothing, (3) and (4).
+fn broken_place(cell: vec2<u32>, p: vec2<i32>) -> vec2<i32> {
     let first = max(cell, vec2<u32>(1u)) - 1u;
     let end = min(cell + 1u, params.cells - 1u);
     // Of candidates that come to p: where they are in the key, their depth and error.
@@ -105,15 +118,15 @@ fn broken_pixel(cell: vec2<u32>, p: vec2<i32>) -> Texel {
         }
     }
     if count > 0u {
-        return sample(best);
+        return best;
     }
-    return hole_pixel(cell, p);
+    return hole_place(cell, p);
 }
 
-fn hole_pixel(cell: vec2<u32>, p: vec2<i32>) -> Texel {
+fn hole_place(cell: vec2<u32>, p: vec2<i32>) -> vec2<i32> {
     let far = far_cell(cell);
     if far == NO_CELL {
-        return sample(p);
+        return p;
     }
     let source = origin[far];
     let depth = near[source];
@@ -121,17 +134,17 @@ fn hole_pixel(cell: vec2<u32>, p: vec2<i32>) -> Texel {
     // (3)
     var q = clamp_valid(p - d);
     if is_far(q, depth) {
-        return read_far(q, depth);
+        return far_place(q, depth);
     }
     // (4)
     let half = params.one_cell >> 1u;
     let middle = centre(vec2<u32>(far % params.cells.x, far / params.cells.x));
     q = clamp_valid(clamp(p, middle - half, middle + half) - d);
     if is_far(q, depth) {
-        return read_far(q, depth);
+        return far_place(q, depth);
     }
     let came_from = centre(vec2<u32>(source % params.cells.x, source / params.cells.x));
-    return sample(nearest_pixel(clamp_valid(came_from)));
+    return nearest_pixel(clamp_valid(came_from));
 }
 
 fn nearest_pixel(q: vec2<i32>) -> vec2<i32> {
@@ -176,12 +189,12 @@ fn is_far(q: vec2<i32>, depth: u32) -> bool {
     return surface.is_there && is_as_near(depth, surface.depth);
 }
 
-// The key at `q`, between pixels only where all of them are far, else at the nearest one, which is.
-fn read_far(q: vec2<i32>, depth: u32) -> Texel {
+// `q` itself where all the pixels around it are far, else the nearest one, which is.
+fn far_place(q: vec2<i32>, depth: u32) -> vec2<i32> {
     let low = q & vec2<i32>(~0xff);
     let is_all_far = is_far(clamp_valid(low), depth)
         && is_far(clamp_valid(low + vec2<i32>(256, 0)), depth)
         && is_far(clamp_valid(low + vec2<i32>(0, 256)), depth)
         && is_far(clamp_valid(low + vec2<i32>(256, 256)), depth);
-    return sample(select(nearest_pixel(q), q, is_all_far));
+    return select(nearest_pixel(q), q, is_all_far);
 }

@@ -2,7 +2,8 @@
 // `cpu.rs`.
 
 @group(0) @binding(1) var<storage, read> carried: array<u32>;
-@group(0) @binding(2) var<storage, read_write> broken: array<u32>;
+// The groups of a dispatch over the broken cells (3), their number, and from word 4 on the cells.
+@group(0) @binding(2) var<storage, read_write> broken: array<atomic<u32>>;
 
 const LOWEST: i32 = -32768;
 
@@ -26,5 +27,17 @@ fn classify(@builtin(global_invocation_id) id: vec3<u32>) {
     // (2). Only a hole has the lowest velocity.
     let ranges = vec2<u32>(high - low);
     let agrees = (low != vec2<i32>(LOWEST)) & (ranges <= vec2<u32>(params.smooth_limit));
-    broken[cell_index(cell)] = select(1u, 0u, all(agrees));
+    if !all(agrees) {
+        // In which order they are listed makes no difference to the picture.
+        let place = atomicAdd(&broken[3], 1u);
+        atomicStore(&broken[4u + place], cell_index(cell));
+    }
+}
+
+@compute @workgroup_size(1, 1)
+fn count_groups() {
+    let groups = (atomicLoad(&broken[3]) + BROKEN_GROUP - 1u) / BROKEN_GROUP;
+    atomicStore(&broken[0], min(groups, GROUPS_OF_A_ROW));
+    atomicStore(&broken[1], (groups + GROUPS_OF_A_ROW - 1u) / GROUPS_OF_A_ROW);
+    atomicStore(&broken[2], 1u);
 }

@@ -21,5 +21,8 @@ pub const CLASSIFY: Shader = Shader {
     file: "classify.wgsl",
     parts: &[COMMON, include_str!("classify.wgsl")],
     bindings: &[Binding::Read(Slot::Carried), Binding::Write(Slot::Broken)],
-    entries: &[Entry::tiles("classify", Extent::Cells)],
+    entries: &[
+        Entry::tiles("classify", Extent::Cells),
+        Entry { name: "count_groups", extent: Extent::One, workgroup: [1, 1] },
+    ],
 };

@@ -25,6 +25,7 @@ pub const SCATTER: Shader = Shader {
         Binding::Write(Slot::Top),
         Binding::Write(Slot::Splat),
         Binding::Write(Slot::Holes),
+        Binding::Write(Slot::Broken),
     ],
     entries: &[
         Entry::tiles("clear", Extent::Cells),

@@ -6,6 +6,7 @@
 @group(0) @binding(3) var<storage, read_write> top: array<atomic<u32>>;
 @group(0) @binding(4) var<storage, read_write> splat: array<atomic<u32>>;
 @group(0) @binding(5) var<storage, read_write> holes: array<u32>;
+@group(0) @binding(6) var<storage, read_write> broken: array<u32>;
 
 @compute @workgroup_size(16, 16)
 fn clear(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -17,6 +18,7 @@ fn clear(@builtin(global_invocation_id) id: vec3<u32>) {
     atomicStore(&splat[i], NO_SOURCE);
     if i == 0u {
         holes[0] = 0u;
+        broken[3] = 0u;
     }
 }
 

@@ -1,0 +1,130 @@
+//! One scene, one digest: on the CPU with any number of threads, and on every GPU adapter there is.
+
+use std::num::NonZeroUsize;
+use std::sync::Arc;
+
+use foreframe_engine::backend::gpu::Gpu;
+use foreframe_engine::backend::gpu::test_adapters::test_gpus;
+use foreframe_engine::key::Camera;
+use foreframe_engine::{
+    ColorPlane, Engine, EngineConfig, KeyInput, Method, MonoSpan, MonoTime, PlaneInput, Rect,
+    StreamFormat,
+};
+use foreframe_fixtures::client::stream_options;
+use foreframe_fixtures::{Recipe, RenderedKey, Renderer, SCENES, SceneInfo, Size};
+use foreframe_replay::virtual_time::digest::FrameDigester;
+use foreframed::ingest;
+
+const SIZE: Size = Size { width: 96, height: 54 };
+const INTERVAL: MonoSpan = MonoSpan::from_ms(25);
+const KEYS: u32 = 3;
+
+/// The keys of a scene, and what their stream declares.
+struct Rendered {
+    format: StreamFormat,
+    keys: Vec<RenderedKey>,
+}
+
+impl Rendered {
+    fn new(scene: &SceneInfo) -> Self {
+        let renderer = Renderer::new((scene.build)());
+        let recipe = Recipe { depth_ratio: 1.5, motion_ratio: 2.0, ..Recipe::new(SIZE) };
+        let message = stream_options(&recipe).to_message(1);
+        let interval = INTERVAL.as_secs_f64();
+        let keys = (1..=KEYS).map(|index| {
+            let time = f64::from(index) * interval;
+            RenderedKey::render(&renderer, &recipe, time, time - interval)
+        });
+        Self { format: ingest::stream_format(&message.format), keys: keys.collect() }
+    }
+
+    /// The digest of two frames after each key.
+    fn digest(&self, method: Method, threads: usize, gpu: Option<&Arc<Gpu>>) -> String {
+        let config = EngineConfig {
+            method,
+            threads: NonZeroUsize::new(threads).unwrap(),
+            pixels_per_degree: None,
+            timer: || MonoTime::ZERO,
+            worker_started: || (),
+        };
+        let mut engine = Engine::new(self.format, config);
+        if let Some(gpu) = gpu {
+            engine.use_gpu(gpu);
+        }
+        let mut digester = FrameDigester::default();
+        let mut picture = ColorPlane::default();
+        for (index, key) in (1..).zip(&self.keys) {
+            let content_time = MonoTime::ZERO + INTERVAL.scale(index, 1);
+            push(&mut engine, key, content_time);
+            // A method that interpolates looks back from its key.
+            let sign = if method.interpolates() { -1 } else { 1 };
+            for third in [1, 2] {
+                let shown_at = content_time + INTERVAL.scale(sign * third, 3);
+                engine.synthesise(shown_at, &mut picture).unwrap();
+                digester.add(&picture);
+            }
+        }
+        assert_eq!(engine.backend().fell_back, None, "{method}");
+        digester.all()
+    }
+}
+
+fn push(engine: &mut Engine, key: &RenderedKey, content_time: MonoTime) {
+    let (depth, motion) = (key.depth_bytes(), key.motion_bytes());
+    let plane = |bytes, size: Size| {
+        let pixels = size.width as usize * size.height as usize;
+        let bytes: &[u8] = bytes;
+        PlaneInput {
+            bytes,
+            width: size.width,
+            height: size.height,
+            stride: (bytes.len() / pixels * size.width as usize) as u32,
+            valid: Rect::full(size.width, size.height),
+            jitter: [0.0; 2],
+        }
+    };
+    let camera = |camera: &foreframe_fixtures::scene::Camera| Camera {
+        view: camera.view,
+        projection: camera.projection,
+    };
+    let input = KeyInput {
+        index: content_time.as_ns(),
+        content_time,
+        motion_from: Some(content_time - INTERVAL),
+        is_cut: false,
+        color: plane(&key.color.rgba, SIZE),
+        depth: Some(plane(&depth, key.depth_size)),
+        motion: Some(plane(&motion, key.motion_size)),
+        camera: Some(camera(&key.camera)),
+        motion_from_camera: Some(camera(&key.motion_from_camera)),
+    };
+    engine.push_key(&input).unwrap();
+}
+
+#[test]
+fn every_scene_has_one_digest_on_the_cpu_and_on_every_adapter() {
+    let gpus = test_gpus("every_scene_has_one_digest_on_the_cpu_and_on_every_adapter");
+    for scene in SCENES {
+        let rendered = Rendered::new(scene);
+        for method in Method::ALL {
+            let expected = rendered.digest(method, 1, None);
+            for threads in [2, 5] {
+                let found = rendered.digest(method, threads, None);
+                assert_eq!(found, expected, "{}: {method}, {threads} threads", scene.name);
+            }
+            for gpu in &gpus {
+                let found = rendered.digest(method, 2, Some(gpu));
+                assert_eq!(found, expected, "{}: {method} on {}", scene.name, gpu.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn one_pixel_of_one_key_makes_another_digest() {
+    let mut rendered = Rendered::new(&SCENES[0]);
+    let before = rendered.digest(Method::Linear, 1, None);
+    let middle = rendered.keys[1].color.rgba.len() / 8 * 4;
+    rendered.keys[1].color.rgba[middle] ^= 1;
+    assert_ne!(rendered.digest(Method::Linear, 1, None), before);
+}
