@@ -10,7 +10,7 @@ use foreframe_engine::{
     ColorPlane, Engine, EngineConfig, KeyInput, Method, MonoSpan, MonoTime, PlaneInput, Rect,
     StreamFormat,
 };
-use foreframe_fixtures::client::stream_options;
+use foreframe_fixtures::client::{CLIENT_MOTION, stream_options};
 use foreframe_fixtures::{Recipe, RenderedKey, Renderer, SCENES, SceneInfo, Size};
 use foreframe_replay::virtual_time::digest::FrameDigester;
 use foreframed::ingest;
@@ -29,7 +29,7 @@ impl Rendered {
     fn new(scene: &SceneInfo) -> Self {
         let renderer = Renderer::new((scene.build)());
         let recipe = Recipe { depth_ratio: 1.5, motion_ratio: 2.0, ..Recipe::new(SIZE) };
-        let message = stream_options(&recipe).to_message(1);
+        let message = stream_options(&recipe, CLIENT_MOTION).to_message(1);
         let interval = INTERVAL.as_secs_f64();
         let keys = (1..=KEYS).map(|index| {
             let time = f64::from(index) * interval;
@@ -70,7 +70,7 @@ impl Rendered {
 }
 
 fn push(engine: &mut Engine, key: &RenderedKey, content_time: MonoTime) {
-    let (depth, motion) = (key.depth_bytes(), key.motion_bytes());
+    let (depth, motion) = (key.depth_bytes(), key.motion_bytes(CLIENT_MOTION));
     let plane = |bytes, size: Size| {
         let pixels = size.width as usize * size.height as usize;
         let bytes: &[u8] = bytes;

@@ -24,7 +24,8 @@ pub struct PlaneBytes<'a> {
     pub info: PlaneInfo,
     /// Bytes from one row to the next, at least `info.row_bytes()`. The padding is not recorded.
     pub stride: u32,
-    /// Pixels; row `y` starts at `y * stride`. The last row may lack its padding.
+    /// Pixels; row `y` starts at `y * stride`. The last row may lack its padding; more than that is
+    /// a plane of another format, and refused.
     pub bytes: &'a [u8],
 }
 
@@ -40,6 +41,13 @@ impl<'a> PlaneBytes<'a> {
         let (row, stride) = (self.info.row_bytes(), u64::from(self.stride));
         if stride < row {
             return Err(BadRecord::new(format!("a stride of at least {row} bytes"), stride));
+        }
+        let most = stride * u64::from(self.info.height);
+        if self.bytes.len() as u64 > most {
+            return Err(BadRecord::new(
+                format!("at most {most} bytes of {}", self.info.kind.name()),
+                self.bytes.len(),
+            ));
         }
         let needed = stride * (u64::from(self.info.height) - 1) + row;
         if (self.bytes.len() as u64) < needed {

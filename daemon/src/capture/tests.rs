@@ -254,7 +254,7 @@ fn the_writer_refuses_what_the_reader_would_not_accept() {
     };
     assert_eq!(attempt(&|_| {}), Ok(()));
     type Edit = &'static dyn Fn(&mut Sample);
-    let refused: [(Edit, &str); 7] = [
+    let refused: [(Edit, &str); 8] = [
         (&|s| s.submit.stream = 2, "a stream that was added"),
         (&|s| s.planes.clear(), "a color plane"),
         (&|s| s.planes.swap(0, 1), "a color plane first"),
@@ -262,6 +262,7 @@ fn the_writer_refuses_what_the_reader_would_not_accept() {
         (&|s| s.planes[0].info.width = 5, "color of 6x4 as in the submit message"),
         (&|s| s.planes[1].info.valid.width = 7, "inside 6x4"),
         (&|s| s.planes[1].bytes.truncate(95), "96 bytes of depth"),
+        (&|s| s.planes[1].bytes.push(0), "at most 96 bytes of depth"),
     ];
     for (edit, expected) in refused {
         let error = attempt(edit).unwrap_err();

@@ -2,7 +2,7 @@
 
 use foreframe_engine::key::Camera;
 use foreframe_engine::{MonoTime, Rect, StreamFormat};
-use foreframe_fixtures::client::stream_options;
+use foreframe_fixtures::client::{CLIENT_MOTION, stream_options};
 use foreframe_fixtures::{Recipe, RenderedKey, Renderer, SceneInfo, Size};
 use foreframed::ingest;
 
@@ -39,11 +39,11 @@ impl RenderedKeys {
         let renderer = Renderer::new((info.build)());
         let recipe =
             Recipe { depth_ratio: field_ratio, motion_ratio: field_ratio, ..Recipe::new(size) };
-        let message = stream_options(&recipe).to_message(1);
+        let message = stream_options(&recipe, CLIENT_MOTION).to_message(1);
         let keys = (1..=KEYS).map(|index| {
             let time = f64::from(index) * KEY_INTERVAL_S;
             let key = RenderedKey::render(&renderer, &recipe, time, time - KEY_INTERVAL_S);
-            let (depth, motion) = (key.depth_bytes(), key.motion_bytes());
+            let (depth, motion) = (key.depth_bytes(), key.motion_bytes(CLIENT_MOTION));
             Frame {
                 index: u64::from(index),
                 content_time: MonoTime::from_ns(0),
@@ -51,7 +51,7 @@ impl RenderedKeys {
                 is_cut: false,
                 color: plane(key.color.rgba, size, 4),
                 depth: Some(plane(depth, key.depth_size, 4)),
-                motion: Some(plane(motion, key.motion_size, 8)),
+                motion: Some(plane(motion, key.motion_size, CLIENT_MOTION.bytes_per_pixel())),
                 camera: Some(camera(&key.camera)),
                 motion_from_camera: Some(camera(&key.motion_from_camera)),
             }

@@ -10,7 +10,9 @@ use anyhow::Context as _;
 use foreframe_fixtures::client::{stream_options, wire_camera};
 use foreframe_fixtures::sequence::motion_bytes;
 use foreframe_fixtures::{Recipe, RenderedKey, Renderer, SCENES, Sampling, SceneInfo, Size};
-use foreframe_protocol::{CreateStream, PlaneDescriptor, PlaneKind, PlaneMap, PlaneSize, Submit};
+use foreframe_protocol::{
+    CreateStream, MotionFormat, PlaneDescriptor, PlaneKind, PlaneMap, PlaneSize, Submit,
+};
 use foreframed::capture::{
     CaptureSource, CaptureWriter, Coding, PlaneBytes, PlaneInfo, SessionInfo,
 };
@@ -21,6 +23,8 @@ use crate::output::Output;
 
 /// Steps, in frames, over which motion is written besides that from frame to frame.
 const KEY_STEPS: [u32; 2] = [3, 4];
+/// Motion is written as exactly as it is known: what is scored against it stands on it.
+const MOTION: MotionFormat = MotionFormat::Rg32f;
 /// Content time of the first frame: late enough that its motion points to a time above 0.
 const START_NS: u64 = 1_000_000_000;
 
@@ -148,7 +152,7 @@ impl Shot<'_> {
             depth_ratio: self.args.field_ratio,
             motion_ratio: self.args.field_ratio,
         };
-        let create = stream_options(&recipe).to_message(1);
+        let create = stream_options(&recipe, MOTION).to_message(1);
         let session = SessionInfo::new(info.name, CaptureSource::Scene)
             .with_config("rate_hz", self.args.rate)
             .with_config("field_ratio", self.args.field_ratio);
@@ -176,13 +180,13 @@ impl Shot<'_> {
         let number = i64::from(frame);
         let (time, before) = (self.time(number), self.time(number - 1));
         let key = RenderedKey::render(&self.renderer, recipe, time, before);
-        let (depth, motion) = (key.depth_bytes(), key.motion_bytes());
+        let (depth, motion) = (key.depth_bytes(), key.motion_bytes(MOTION));
         let content_time_ns = self.content_time_ns(number);
         let motion_from_ns = self.content_time_ns(number - 1);
         let planes = [
             (PlaneKind::Color, key.color.size, 4, &key.color.rgba),
             (PlaneKind::Depth, key.depth_size, 4, &depth),
-            (PlaneKind::Motion, key.motion_size, 8, &motion),
+            (PlaneKind::Motion, key.motion_size, MOTION.bytes_per_pixel(), &motion),
         ];
         let mut described = PlaneMap::default();
         let mut records = Vec::new();
@@ -208,7 +212,7 @@ impl Shot<'_> {
             );
             let motion_from_ns = Some(self.content_time_ns(from));
             let info = PlaneInfo { which, motion_from_ns, ..motion_info };
-            records.push((info, motion_bytes(&fields.motion)));
+            records.push((info, motion_bytes(&fields.motion, MOTION)));
         }
         let submit = Submit {
             stream: create.stream,
@@ -234,4 +238,44 @@ pub(crate) fn parse_size(text: &str) -> Result<Size, String> {
     text.split_once('x')
         .and_then(|(width, height)| Some(Size::new(side(width)?, side(height)?)))
         .ok_or_else(|| format!("expected WIDTHxHEIGHT of 1 to {}, found `{text}`", Size::MAX))
+}
+
+#[cfg(test)]
+mod tests {
+    use foreframed::capture::Capture;
+
+    use super::*;
+
+    #[test]
+    fn the_motion_of_a_capture_is_that_of_the_scene_over_each_step() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("pan.mcap");
+        let info = SceneInfo::by_name("pan").unwrap();
+        let args = Args {
+            name: Some(info),
+            output: Some(path.clone()),
+            png: None,
+            size: Size::new(50, 30),
+            rate: 100.0,
+            seconds: 0.04,
+            field_ratio: 1.5,
+        };
+        let shot = Shot { renderer: Renderer::new((info.build)()), args: &args, frames: 5 };
+        shot.write_capture(info, &path, &Output::new(true)).unwrap();
+        let capture = Capture::open(&path).unwrap();
+        assert_eq!(capture.streams()[0].format.motion.unwrap().format, MotionFormat::Rg32f);
+        let last = capture.frame(4).unwrap();
+        for step in [1, 4] {
+            let motion = last.motion_from(shot.content_time_ns(4 - step)).unwrap();
+            let (floats, rest) = motion.bytes.as_chunks::<4>();
+            assert!(rest.is_empty());
+            let found: Vec<f32> = floats.iter().map(|&bytes| f32::from_le_bytes(bytes)).collect();
+            let size = args.size;
+            let (time, from) = (shot.time(4), shot.time(4 - step));
+            let fields = shot.renderer.fields(time, from, size, size.reduced(1.5));
+            assert_eq!(found, fields.motion.as_flattened(), "over {step} frames");
+            assert!(found.iter().any(|motion| motion.abs() > 0.1), "the scene moves");
+        }
+        assert!(last.motion_from(shot.content_time_ns(1)).is_none(), "only every third has three");
+    }
 }

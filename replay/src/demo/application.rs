@@ -7,7 +7,7 @@ use std::time::Duration;
 use anyhow::{Context as _, bail};
 use foreframe_client::{Client, ConnectOptions, Event, Statistics, StreamId};
 use foreframe_engine::{MonoSpan, MonoTime};
-use foreframe_fixtures::client::{DemoClient, KeyFate, Next, stream_options};
+use foreframe_fixtures::client::{CLIENT_MOTION, DemoClient, KeyFate, Next, stream_options};
 use foreframe_fixtures::{Recipe, Size};
 use foreframed::clock;
 use indicatif::ProgressBar;
@@ -54,7 +54,7 @@ impl Application {
         let mut client =
             options.connect(CONNECT_TIMEOUT).context("connecting as the application")?;
         let stream = client
-            .create_stream(&stream_options(&Recipe::new(size)))
+            .create_stream(&stream_options(&Recipe::new(size), CLIENT_MOTION))
             .context("creating the stream")?;
         Ok(Self { client, stream, base })
     }
