@@ -12,6 +12,9 @@
 pub mod detection;
 pub mod display;
 mod error;
+pub mod flicker;
+pub mod motion_quality;
+pub mod plane;
 pub mod sensitivity;
 pub mod tracking;
 

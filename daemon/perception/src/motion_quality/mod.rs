@@ -70,14 +70,23 @@ pub fn quality_difference(
     velocity: f64,
     motion: Motion,
 ) -> QualityDifference {
-    let difference = |of: &dyn Fn(Shown) -> f64| of(this) - of(that);
-    let parallel = |shown| blur::energy(blur::parallel_sigma(shown, velocity, motion));
-    let orthogonal = |shown: Shown| blur::energy(blur::resolution_sigma(shown.ppd));
-    let judder = |shown: Shown| judder::energy(shown.refresh_hz, velocity, motion);
+    let [ours, theirs] = [this, that].map(|shown| parts(shown, velocity, motion));
     QualityDifference {
-        parallel: WEIGHT_PARALLEL * difference(&parallel),
-        orthogonal: WEIGHT_ORTHOGONAL * difference(&orthogonal),
-        judder: -WEIGHT_JUDDER * difference(&judder),
+        parallel: ours.parallel - theirs.parallel,
+        orthogonal: ours.orthogonal - theirs.orthogonal,
+        judder: ours.judder - theirs.judder,
+    }
+}
+
+/// Quality against nothing to see at all. Only differences mean something.
+fn parts(shown: Shown, velocity: f64, motion: Motion) -> QualityDifference {
+    let along = blur::energy(blur::parallel_sigma(shown, velocity, motion));
+    let across = blur::energy(blur::resolution_sigma(shown.ppd));
+    let judder = judder::energy(shown.refresh_hz, velocity, motion);
+    QualityDifference {
+        parallel: WEIGHT_PARALLEL * along,
+        orthogonal: WEIGHT_ORTHOGONAL * across,
+        judder: -WEIGHT_JUDDER * judder,
     }
 }
 

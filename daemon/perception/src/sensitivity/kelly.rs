@@ -5,11 +5,11 @@
 //! are of the size of this function only with `a = rho`; those thresholds are what we use, so this
 //! is what goes with them. A factor of 2 pi would make judder vanish at any rate.
 
-/// Ratio of successive frequencies in the search for the peak: the peak value is off by less than
-/// 1e-4 of itself.
-const SEARCH_STEP: f64 = 1.02;
-/// Where the search starts and ends, cpd.
-const SEARCH_CPD: [f64; 2] = [0.05, 100.0];
+/// Frequencies at which the search for the peak starts: eight to a decade from 0.05 to 100 cpd, so
+/// that the highest of them is next to the peak.
+const COARSE_STEPS: i32 = 26;
+/// Halvings of the interval around the highest of them.
+const FINE_STEPS: i32 = 24;
 
 /// Sensitivity to a grating of `cpd` that drifts past at `hz`. Domain: both 0 and up; where either
 /// is 0 there is no motion, and it is 0.
@@ -27,14 +27,19 @@ pub fn band_pass(cpd: f64, hz: f64) -> f64 {
 /// Frequency of the highest sensitivity at `hz`, cpd.
 #[must_use]
 pub fn peak_cpd(hz: f64) -> f64 {
-    let (mut best, mut cpd) = (SEARCH_CPD[0], SEARCH_CPD[0]);
-    while cpd < SEARCH_CPD[1] {
-        if band_pass(cpd, hz) > band_pass(best, hz) {
-            best = cpd;
+    let coarse = |step: i32| 0.05 * libm::pow(10.0, f64::from(step) / 8.0);
+    let higher = |a: &i32, b: &i32| band_pass(coarse(*a), hz).total_cmp(&band_pass(coarse(*b), hz));
+    let best = (0..=COARSE_STEPS).max_by(higher).unwrap_or_default();
+    let (mut low, mut high) = (coarse(best - 1), coarse(best + 1));
+    for _ in 0..FINE_STEPS {
+        let third = (high - low) / 3.0;
+        if band_pass(low + third, hz) < band_pass(high - third, hz) {
+            low += third;
+        } else {
+            high -= third;
         }
-        cpd *= SEARCH_STEP;
     }
-    best
+    f64::midpoint(low, high)
 }
 
 /// The same, held at its peak below the frequency of the peak, because the copies of a spectrum
@@ -64,8 +69,8 @@ mod tests {
             for step in 0..300 {
                 let cpd = 0.1 * libm::pow(1.02, f64::from(step));
                 let value = low_pass(cpd, hz);
-                assert!(value <= last * (1.0 + 1e-4), "{cpd} cpd at {hz} Hz");
-                assert!(value >= band_pass(cpd, hz) * (1.0 - 1e-3));
+                assert!(value <= last * (1.0 + 1e-6), "{cpd} cpd at {hz} Hz");
+                assert!(value >= band_pass(cpd, hz) * (1.0 - 1e-6));
                 last = value;
             }
         }

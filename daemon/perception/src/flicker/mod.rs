@@ -1,0 +1,79 @@
+//! Flicker: how likely a viewer sees that two frames alternate.
+//!
+//! Denes 2020, chapter 7. The difference of a pair of frames is split into bands of spatial
+//! frequency; in each, contrast times sensitivity at half the refresh rate gives a probability, and
+//! bands add up as independent detectors. The map is blurred by the size of a finger's mark, as the
+//! parameters were fitted to areas that viewers painted.
+//!
+//! Frames are luminance in cd/m2. The eye is taken as still on the picture: for content that is
+//! followed, align the frames first.
+
+mod bands;
+
+pub use bands::{Bands, LOWEST_CPD};
+
+use crate::PerceptionError;
+use crate::detection::{SLOPE, probability};
+use crate::plane::Plane;
+use crate::sensitivity::PyramidOfVisibility;
+
+/// Standard deviation of the blur of the map, deg (section 7.2, fixed by the authors).
+pub const POOLING_DEG: f64 = 0.36;
+
+/// How and where a pair of frames is shown.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct FlickerModel {
+    /// Refresh rate: the pair repeats at half of it, Hz.
+    pub refresh_hz: f64,
+    /// Pixels per degree.
+    pub ppd: f64,
+    /// Sensitivity to flicker.
+    pub sensitivity: PyramidOfVisibility,
+}
+
+impl FlickerModel {
+    /// With the parameters that were fitted to all markings.
+    ///
+    /// # Errors
+    /// If the rate or the resolution is not above 0.
+    pub fn new(refresh_hz: f64, ppd: f64) -> Result<Self, PerceptionError> {
+        PerceptionError::check_positive("refresh_hz", refresh_hz)?;
+        PerceptionError::check_positive("ppd", ppd)?;
+        Ok(Self { refresh_hz, ppd, sensitivity: PyramidOfVisibility::FIT_TO_ALL })
+    }
+
+    /// Probability of detection for a contrast of 0 to 1 in one band of `cpd`, at a mean luminance
+    /// of `luminance` cd/m2 (equations 7.5 and 7.6; for the latter see [`probability`]).
+    #[must_use]
+    pub fn of_contrast(&self, contrast: f64, cpd: f64, luminance: f64) -> f64 {
+        let seen = self.sensitivity.sensitivity(self.refresh_hz / 2.0, cpd, luminance);
+        probability(contrast * seen, SLOPE)
+    }
+
+    /// Probability of detection in each pixel when `first` and `second` alternate, both luminance
+    /// in cd/m2 (equations 7.1 to 7.7). Where there is no light at all it is 0.
+    ///
+    /// # Errors
+    /// If they differ in size.
+    pub fn map(&self, first: &Plane, second: &Plane) -> Result<Plane, PerceptionError> {
+        first.check_same_size(second)?;
+        let difference = first.zip(second, |first, second| first - second);
+        let sum = first.zip(second, |first, second| first + second);
+        let bands = Bands::split(&difference, self.ppd);
+        let mut missed = Plane::filled(first.width(), first.height(), 1.0);
+        for (band, cpd) in bands.iter() {
+            for (index, missed) in missed.values_mut().iter_mut().enumerate() {
+                let sum = f64::from(sum.values()[index]);
+                if sum > 0.0 {
+                    let contrast = f64::from(band.values()[index]).abs() / sum;
+                    *missed *= 1.0 - self.of_contrast(contrast, cpd, 0.5 * sum) as f32;
+                }
+            }
+        }
+        let seen = missed.map(|missed| 1.0 - missed);
+        Ok(seen.blurred((POOLING_DEG * self.ppd) as f32))
+    }
+}
+
+#[cfg(test)]
+mod tests;
