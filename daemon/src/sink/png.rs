@@ -30,18 +30,43 @@ impl PngSink {
         Ok(Self { dir: dir.to_owned(), converter: SrgbConverter::new(format), rgb: Vec::new() })
     }
 
+    /// The files of this sink in `dir`, those of an earlier one too, in any order. None where there
+    /// is no such folder.
+    ///
+    /// # Errors
+    /// If the folder cannot be read.
+    pub fn files_in(dir: &Path) -> io::Result<Vec<PathBuf>> {
+        let entries = match fs::read_dir(dir) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+            entries => entries?,
+        };
+        let paths = entries.map(|entry| Ok(entry?.path())).collect::<io::Result<Vec<_>>>()?;
+        Ok(paths.into_iter().filter(|path| is_frame_file(path)).collect())
+    }
+
     /// Writes output frame number `index`.
     ///
     /// # Errors
     /// If the file cannot be written.
     pub fn write(&mut self, index: u64, frame: &ColorPlane) -> io::Result<()> {
         self.converter.convert(frame, &mut self.rgb);
-        let file = File::create(self.dir.join(format!("frame_{index:06}.png")))?;
+        let file = File::create(self.dir.join(file_name(index)))?;
         // The cheapest settings that still compress: a sink has to keep up with the display.
         PngEncoder::new_with_quality(BufWriter::new(file), CompressionType::Fast, FilterType::Sub)
             .write_image(&self.rgb, frame.width(), frame.height(), ExtendedColorType::Rgb8)
             .map_err(io::Error::other)
     }
+}
+
+fn file_name(index: u64) -> String {
+    format!("frame_{index:06}.png")
+}
+
+/// Whether this sink could have written it.
+fn is_frame_file(path: &Path) -> bool {
+    let Some(name) = path.file_name().and_then(|name| name.to_str()) else { return false };
+    let index = name.strip_prefix("frame_").and_then(|rest| rest.strip_suffix(".png"));
+    index.and_then(|index| index.parse().ok()).is_some_and(|index| file_name(index) == name)
 }
 
 #[cfg(test)]
@@ -50,6 +75,21 @@ mod tests {
     use foreframe_engine::color::Rgba8;
 
     use super::*;
+
+    #[test]
+    fn its_files_are_told_from_others_by_their_names() {
+        for (name, is_one) in [
+            ("frame_000000.png", true),
+            ("frame_1234567.png", true),
+            ("frame_0000001.png", false),
+            ("frame_12.png", false),
+            ("frame_+00012.png", false),
+            ("frame_000012.jpg", false),
+            ("my_frame_000012.png", false),
+        ] {
+            assert_eq!(is_frame_file(&Path::new("some folder").join(name)), is_one, "{name}");
+        }
+    }
 
     #[test]
     fn a_written_file_reads_back_exactly() {

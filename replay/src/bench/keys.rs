@@ -22,15 +22,27 @@ pub(super) struct RenderedKeys {
     pub(super) keys: Vec<Frame>,
 }
 
-/// Bytes that a key and an in-between frame have to move at least.
+/// Planes, in bytes, that a key and an in-between frame have to read or write at least once.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct MovedBytes {
     /// Planes of a key as they arrive.
-    pub key: usize,
-    /// Colour of a frame, which is read from the key and written to the output.
+    pub planes: usize,
+    /// Colour of a frame.
     pub color: usize,
-    /// Depth key and velocity of every cell of the field grid, read by a frame.
+    /// Depth key and velocity of every cell of the field grid.
     pub field: usize,
+}
+
+impl MovedBytes {
+    /// Read and written by taking in a key: its planes become colour and field.
+    pub(super) fn key(&self) -> usize {
+        self.planes + self.color + self.field
+    }
+
+    /// Read and written by making a frame: colour and field are read, colour is written.
+    pub(super) fn frame(&self) -> usize {
+        2 * self.color + self.field
+    }
 }
 
 impl RenderedKeys {
@@ -65,7 +77,7 @@ impl RenderedKeys {
         let fields = [depth, motion].map(|plane| plane.as_ref().map_or(0, |p| p.bytes.len()));
         let cells = depth.as_ref().map_or(0, |plane| plane.width as usize * plane.height as usize);
         MovedBytes {
-            key: color.bytes.len() + fields[0] + fields[1],
+            planes: color.bytes.len() + fields[0] + fields[1],
             color: color.bytes.len(),
             field: 8 * cells,
         }
@@ -85,4 +97,34 @@ fn plane(bytes: Vec<u8>, size: Size, bytes_per_pixel: u32) -> OwnedPlane {
 
 fn camera(camera: &foreframe_fixtures::scene::Camera) -> Camera {
     Camera { view: camera.view, projection: camera.projection }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_are_those_of_the_planes_that_are_read_and_written() {
+        let info = SceneInfo::by_name("static").unwrap();
+        let rendered = RenderedKeys::render(info, Size::new(64, 32), 2.0);
+        let (pixels, cells) = (64 * 32, 32 * 16);
+        // Colour of 4 bytes, depth of 4, motion of 4; in the engine 4 of depth, 4 of velocity.
+        let bytes = rendered.bytes();
+        let expected =
+            MovedBytes { planes: 4 * pixels + 8 * cells, color: 4 * pixels, field: 8 * cells };
+        assert_eq!(bytes, expected);
+        assert_eq!(bytes.key(), 8 * pixels + 16 * cells);
+        assert_eq!(bytes.frame(), 8 * pixels + 8 * cells);
+    }
+
+    #[test]
+    fn motion_is_what_the_stream_declares() {
+        let info = SceneInfo::by_name("pan").unwrap();
+        let size = Size::new(64, 32);
+        let rendered = RenderedKeys::render(info, size, 2.0);
+        let declared = rendered.format.motion.unwrap().format.bytes_per_pixel();
+        let motion = rendered.keys[0].motion.as_ref().unwrap();
+        assert_eq!(motion.stride, motion.width * declared);
+        assert_eq!(motion.bytes.len(), (motion.stride * motion.height) as usize);
+    }
 }

@@ -1,19 +1,14 @@
 //! The loop that is timed.
 
-use anyhow::Context as _;
 use foreframe_engine::{ColorPlane, Engine, EngineConfig, Method, MonoSpan, MonoTime};
 use foreframed::clock;
-use rayon::iter::{IndexedParallelIterator as _, ParallelIterator as _};
-use rayon::slice::{ParallelSlice as _, ParallelSliceMut as _};
-use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use super::Settings;
+use super::copy::PlainCopy;
 use super::keys::{KEY_INTERVAL_S, RenderedKeys};
+use super::{Backend, Settings};
 
 /// Keys that are run before the first that counts: buffers get their sizes, clocks their speed.
 const WARM_UP: usize = 4;
-/// Bytes that one thread copies at a time.
-const COPY_CHUNK: usize = 1 << 18;
 
 /// Times of one case, one entry per key or frame.
 #[derive(Clone, PartialEq, Debug, Default)]
@@ -22,19 +17,25 @@ pub(super) struct Times {
     pub(super) key: Vec<MonoSpan>,
     /// Making an in-between frame.
     pub(super) frame: Vec<MonoSpan>,
+    /// A key and its first two frames; empty where it has fewer.
+    pub(super) key_and_two: Vec<MonoSpan>,
     /// A key and all of its frames.
     pub(super) total: Vec<MonoSpan>,
-    /// Copying the planes of a key.
+    /// The plain copy for a key.
     pub(super) key_copy: Vec<MonoSpan>,
-    /// Copying the colour of a frame.
+    /// The plain copy for a frame.
     pub(super) frame_copy: Vec<MonoSpan>,
+    /// Why the CPU took over, if it did.
+    pub(super) fell_back: Option<String>,
 }
 
 /// Times one case.
 pub(super) fn time_case(
     rendered: &RenderedKeys,
     method: Method,
+    backend: &Backend,
     settings: &Settings,
+    copy: &mut PlainCopy,
 ) -> anyhow::Result<Times> {
     let config = EngineConfig {
         method,
@@ -44,9 +45,10 @@ pub(super) fn time_case(
         timer: || MonoTime::from_ns(0),
     };
     let mut engine = Engine::new(rendered.format, config);
-    let pool = ThreadPoolBuilder::new().num_threads(settings.threads.get()).build();
-    let pool = pool.context("starting the threads of the plain copy")?;
-    let mut copies = vec![Vec::new(); 4];
+    if let Some(gpu) = &backend.gpu {
+        engine.use_gpu(gpu);
+    }
+    let bytes = rendered.bytes();
     let mut out = ColorPlane::default();
     let mut times = Times::default();
     let interval = MonoSpan::from_secs_f64(KEY_INTERVAL_S);
@@ -57,43 +59,60 @@ pub(super) fn time_case(
         input.index = index as u64;
         input.content_time = content_time;
         input.motion_from = Some(content_time - interval);
-        let counts = index >= WARM_UP;
-        let started_at = clock::now();
+        let mut ends = Vec::with_capacity(settings.frames.get() + 2);
+        ends.push(clock::now());
         engine.push_key(&input)?;
-        let taken_at = clock::now();
-        let mut before = taken_at;
+        ends.push(clock::now());
         let frames = settings.frames.get() as i64;
         for frame in 1..=frames {
             engine.synthesise(content_time + interval.scale(frame, frames + 1), &mut out);
-            let made_at = clock::now();
-            if counts {
-                times.frame.push(made_at - before);
-            }
-            before = made_at;
+            ends.push(clock::now());
         }
-        if counts {
-            times.key.push(taken_at - started_at);
-            times.total.push(before - started_at);
-        }
-        let planes = [Some(&key.color), key.depth.as_ref(), key.motion.as_ref()];
-        let started_at = clock::now();
-        for (plane, copy) in planes.into_iter().flatten().zip(&mut copies) {
-            copy_bytes(&pool, &plane.bytes, copy);
-        }
-        let copied_at = clock::now();
-        copy_bytes(&pool, &key.color.bytes, &mut copies[3]);
-        if counts {
-            times.key_copy.push(copied_at - started_at);
-            times.frame_copy.push(clock::now() - copied_at);
+        let copy_starts_at = clock::now();
+        copy.copy(bytes.key() / 2);
+        let key_copied_at = clock::now();
+        copy.copy(bytes.frame() / 2);
+        let frame_copied_at = clock::now();
+        if index >= WARM_UP {
+            times.add_key(&ends);
+            times.key_copy.push(key_copied_at - copy_starts_at);
+            times.frame_copy.push(frame_copied_at - key_copied_at);
         }
     }
+    times.fell_back.clone_from(&engine.backend().fell_back);
     Ok(times)
 }
 
-fn copy_bytes(pool: &ThreadPool, from: &[u8], to: &mut Vec<u8>) {
-    to.resize(from.len(), 0);
-    pool.install(|| {
-        let parts = to.par_chunks_mut(COPY_CHUNK).zip(from.par_chunks(COPY_CHUNK));
-        parts.for_each(|(to, from)| to.copy_from_slice(from));
-    });
+impl Times {
+    /// Adds one key: when it was handed over, when it was taken in, and when each of its frames was
+    /// ready.
+    fn add_key(&mut self, ends: &[MonoTime]) {
+        let [started_at, taken_at, ..] = *ends else { return };
+        self.key.push(taken_at - started_at);
+        self.frame.extend(ends[1..].windows(2).map(|pair| pair[1] - pair[0]));
+        self.key_and_two.extend(ends.get(3).map(|&second| second - started_at));
+        self.total.extend(ends.last().map(|&last| last - started_at));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_span_lies_between_the_instants_that_it_is_named_after() {
+        let at = |ms: &[i64]| -> Vec<MonoTime> {
+            ms.iter().map(|&ms| MonoTime::ZERO + MonoSpan::from_ms(ms)).collect()
+        };
+        let ms = |spans: &[i64]| -> Vec<MonoSpan> {
+            spans.iter().map(|&ms| MonoSpan::from_ms(ms)).collect()
+        };
+        let mut times = Times::default();
+        times.add_key(&at(&[10, 13, 18, 25, 40]));
+        times.add_key(&at(&[50, 51, 53]));
+        assert_eq!(times.key, ms(&[3, 1]));
+        assert_eq!(times.frame, ms(&[5, 7, 15, 2]));
+        assert_eq!(times.key_and_two, ms(&[15]), "the second key has one frame");
+        assert_eq!(times.total, ms(&[30, 3]));
+    }
 }

@@ -15,7 +15,8 @@ use crate::output::Output;
 #[derive(clap::Args, Debug)]
 #[command(after_help = "\
 Leaves contact-sheet.png (key, in-between, truth, error), timeline.png (when keys came and what was
-shown) and summary.json in the folder. Needs about 2 GB of memory at 1280x720 for 3 seconds.")]
+shown) and summary.json in the folder, and removes what an earlier demo left there or as
+frame_NNNNNN.png in the folder of --sink png. Needs about 2 GB of memory at 1280x720 for 3 seconds.")]
 pub struct Args {
     /// Scene to show; `foreframe scenes` lists them
     #[arg(long, value_name = "NAME", default_value = "atrium", value_parser = parse_scene)]
@@ -62,7 +63,7 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
         refresh_hz: args.refresh,
         method: args.method,
         backend: args.backend.clone(),
-        sink: args.sink.to_string(),
+        sink: args.sink.clone(),
         out: args.out.clone(),
     };
     let summary = demo::run(&settings, output)?;

@@ -231,7 +231,7 @@ mod tests {
             refresh_hz: 120.0,
             backend: foreframe_engine::backend::choice::BackendChoice::Cpu,
             method: Method::Linear,
-            sink: "null".to_owned(),
+            sink: foreframed::config::SinkSpec::Null,
             out: PathBuf::new(),
         };
         let rehearsal = Rehearsal::render(&settings, &Output::new(true));

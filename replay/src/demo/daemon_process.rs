@@ -42,7 +42,7 @@ impl DaemonProcess {
             .arg("serve")
             .arg("--socket")
             .arg(socket_in(folder.path()))
-            .args(["--sink", &settings.sink])
+            .args(["--sink", &settings.sink.to_string()])
             .args(["--refresh", &settings.refresh_hz.to_string()])
             .args(["--method", settings.method.name()])
             .args(["--backend", &settings.backend.to_string()])

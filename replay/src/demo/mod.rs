@@ -8,6 +8,7 @@
 pub mod application;
 pub mod audience;
 pub mod daemon_process;
+mod refreshes;
 pub mod rehearsal;
 pub mod summary;
 
@@ -22,6 +23,7 @@ use foreframe_engine::backend::choice::BackendChoice;
 use foreframe_engine::{Method, MonoSpan};
 use foreframe_fixtures::{SceneInfo, Size};
 use foreframed::clock;
+use foreframed::config::SinkSpec;
 
 use crate::output::Output;
 use application::Application;
@@ -52,8 +54,8 @@ pub struct Settings {
     pub method: Method,
     /// What makes them.
     pub backend: BackendChoice,
-    /// Sink of the daemon, as on its command line.
-    pub sink: String,
+    /// Sink of the daemon.
+    pub sink: SinkSpec,
     /// Where the pictures and the summary go.
     pub out: PathBuf,
 }
@@ -63,7 +65,7 @@ pub struct Settings {
 /// # Errors
 /// If the daemon cannot be started, a client is refused, or a picture cannot be written.
 pub fn run(settings: &Settings, output: &Output) -> anyhow::Result<Summary> {
-    summary::prepare(&settings.out)?;
+    summary::prepare(&settings.out, &settings.sink)?;
     let rehearsal = Rehearsal::render(settings, output);
     let daemon = DaemonProcess::start(settings)?;
     let base = clock::now() + HEAD_START;

@@ -6,32 +6,35 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use foreframe_client::OutputKind;
-use foreframe_engine::{MonoSpan, MonoTime};
+use foreframe_engine::MonoSpan;
+use foreframed::config::SinkSpec;
+use foreframed::sink::png::PngSink;
 use serde::Serialize;
 
 use super::Settings;
 use super::application::Submissions;
 use super::audience::{Kept, ROW_STEP, Seen, Shown, psnr_rgb_db};
+use super::refreshes::{content_judder, timeline_events};
 use super::rehearsal::Rehearsal;
 use crate::draw::Rgba8Image;
-use crate::pictures::{ContactSheetRow, PresentKind, TimelineEvent, contact_sheet, timeline};
-
-/// Part of the show that the timeline draws: 0.4 s from the second third on.
-const TIMELINE_SPAN: MonoSpan = MonoSpan::from_ms(400);
+use crate::pictures::{ContactSheetRow, PresentKind, contact_sheet, timeline};
 
 const CONTACT_SHEET: &str = "contact-sheet.png";
 const TIMELINE: &str = "timeline.png";
 const NUMBERS: &str = "summary.json";
 
-/// Makes the folder, and removes what an earlier demo left in it: nobody shall take its pictures
-/// for those of this one.
+/// Makes the folder, and removes what an earlier demo left in it and in the folder of the sink:
+/// nobody shall take its pictures for those of this one.
 ///
 /// # Errors
-/// If the folder cannot be made or a file in it not removed.
-pub fn prepare(out: &Path) -> anyhow::Result<()> {
+/// If the folder cannot be made or a file not removed.
+pub fn prepare(out: &Path, sink: &SinkSpec) -> anyhow::Result<()> {
     fs::create_dir_all(out).with_context(|| format!("making {}", out.display()))?;
-    for name in [CONTACT_SHEET, TIMELINE, NUMBERS] {
-        let path = out.join(name);
+    let mut stale: Vec<_> = [CONTACT_SHEET, TIMELINE, NUMBERS].map(|name| out.join(name)).into();
+    if let SinkSpec::Png(dir) = sink {
+        stale.extend(PngSink::files_in(dir).with_context(|| format!("reading {}", dir.display()))?);
+    }
+    for path in stale {
         match fs::remove_file(&path) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => {
                 return Err(error).with_context(|| format!("removing {}", path.display()));
@@ -69,9 +72,11 @@ pub struct Summary {
     pub psnr_rgb_db: Option<f64>,
     /// The worst of them.
     pub psnr_rgb_min_db: Option<f64>,
-    /// In-between frames that were compared, by one row in [`ROW_STEP`] each.
+    /// In-between frames that were compared.
     pub compared: u64,
-    /// Real frames that differ from their key in the rows that were compared, as above.
+    /// Of so many rows of each of them one was compared. None where none was.
+    pub compared_row_step: Option<u32>,
+    /// Real frames that differ from their key in one row of [`ROW_STEP`].
     pub real_frames_changed: u64,
     /// Time to fill a slot and submit it. None without keys.
     pub fill_and_submit_ms: Option<f64>,
@@ -95,6 +100,8 @@ pub struct Summary {
     pub out: PathBuf,
     /// Pictures that were written there: without in-between frames there is nothing to draw.
     pub pictures: Vec<&'static str>,
+    /// Where the daemon wrote every frame that was shown, if it was asked to.
+    pub output_frames: Option<String>,
 }
 
 impl Summary {
@@ -114,7 +121,7 @@ impl Summary {
         };
         let dropped = settled(|counts| counts.dropped);
         let planned = settled(|counts| counts.synthesised) + dropped;
-        let compared: Vec<f64> = compared(seen, rehearsal);
+        let Compared { db: compared, row_step } = Compared::new(seen, rehearsal);
         Self {
             key_frames: submissions.sent.len() as u64,
             skipped_keys: submissions.skipped,
@@ -125,10 +132,11 @@ impl Summary {
             dropped: count(|counts| counts.dropped),
             dropped_after_first_second: dropped,
             dropped_percent: 100.0 * ratio(dropped, planned),
-            content_judder: content_judder(&seen.frames, settings.refresh_hz),
+            content_judder: content_judder(&seen.frames, MonoSpan::from_hz(settings.refresh_hz)),
             psnr_rgb_db: mean(&compared),
             psnr_rgb_min_db: compared.iter().copied().min_by(f64::total_cmp),
             compared: compared.len() as u64,
+            compared_row_step: row_step,
             real_frames_changed: changed_real_frames(seen),
             fill_and_submit_ms: median_ms(&submissions.work),
             synthesis_ms: (count(|counts| counts.synthesised + counts.dropped) > 0)
@@ -142,6 +150,7 @@ impl Summary {
             refresh_hz: settings.refresh_hz,
             out: settings.out.clone(),
             pictures: Vec::new(),
+            output_frames: settings.sink.keeps_frames().then(|| settings.sink.to_string()),
         }
     }
 
@@ -168,11 +177,16 @@ impl Summary {
             ),
             format!("content judder      {}", or_none(self.content_judder, 4, " of a refresh interval")),
             format!(
-                "error               {} PSNR on average, {} at worst, {} of {} in-betweens compared, 1 row in {ROW_STEP}",
+                "error               {} PSNR on average, {} at worst, {} of {} in-betweens compared{}",
                 or_none(self.psnr_rgb_db, 1, " dB"),
                 or_none(self.psnr_rgb_min_db, 1, " dB"),
                 self.compared,
-                self.synthesised
+                self.synthesised,
+                match self.compared_row_step {
+                    None => String::new(),
+                    Some(1) => ", all rows".to_owned(),
+                    Some(step) => format!(", 1 row in {step}"),
+                }
             ),
             format!("real frames changed {}", self.real_frames_changed),
             format!(
@@ -181,7 +195,10 @@ impl Summary {
                 or_none(self.synthesis_ms, 2, " ms"),
                 self.backend
             ),
-            format!("look at             {pictures}"),
+            format!("look at             {pictures}{}", match &self.output_frames {
+                Some(sink) => format!("; every frame that was shown went to {sink}"),
+                None => String::new(),
+            }),
             format!("numbers             {out}/{NUMBERS}"),
         ]
         .join("\n")
@@ -203,7 +220,14 @@ impl Summary {
             save(&sheet, &out.join(CONTACT_SHEET))?;
             self.pictures.push(CONTACT_SHEET);
         }
-        let events = events(submissions, seen, rehearsal);
+        let interval = MonoSpan::from_hz(self.refresh_hz);
+        let events = timeline_events(
+            submissions,
+            seen,
+            rehearsal.key_interval_ns,
+            interval,
+            self.unshown_kind(),
+        );
         if !events.is_empty() {
             let title = format!(
                 "{} at {} Hz to {} Hz, {}",
@@ -215,6 +239,15 @@ impl Summary {
         let json = serde_json::to_string_pretty(self)?;
         let path = out.join(NUMBERS);
         fs::write(&path, json + "\n").with_context(|| format!("writing {}", path.display()))
+    }
+
+    /// What a refresh without a new picture was. The audience cannot tell a picture that was not
+    /// ready from one that was not wanted; the daemon counts them.
+    fn unshown_kind(&self) -> PresentKind {
+        match (self.repeated, self.dropped) {
+            (0, 1..) => PresentKind::Dropped,
+            _ => PresentKind::Repeated,
+        }
     }
 
     fn draw_contact_sheet(
@@ -253,20 +286,31 @@ fn without_alpha(rgba: &[u8]) -> Vec<u8> {
     rgba.chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect()
 }
 
-/// Decibels of every in-between frame that has a truth: those that fell on a refresh of the
-/// rehearsal, or else those kept for the sheet, whose truth is rendered for it.
-fn compared(seen: &Seen, rehearsal: &Rehearsal) -> Vec<f64> {
-    let is_made = |shown: &&Shown| shown.kind == OutputKind::Synthesised;
-    let on_grid: Vec<f64> =
-        seen.frames.iter().filter(is_made).filter_map(|shown| shown.psnr_rgb_db).collect();
-    if !on_grid.is_empty() {
-        return on_grid;
+/// What the in-between frames have of the truth.
+struct Compared {
+    /// Decibels of every in-between frame that has a truth.
+    db: Vec<f64>,
+    /// Of so many rows one was compared.
+    row_step: Option<u32>,
+}
+
+impl Compared {
+    /// Those that fell on a refresh of the rehearsal, or else those kept for the sheet, all of whose
+    /// rows there are and whose truth is rendered for it.
+    fn new(seen: &Seen, rehearsal: &Rehearsal) -> Self {
+        let is_made = |shown: &&Shown| shown.kind == OutputKind::Synthesised;
+        let on_grid = seen.frames.iter().filter(is_made).filter_map(|shown| shown.psnr_rgb_db);
+        let (mut db, mut row_step) = (on_grid.collect::<Vec<_>>(), ROW_STEP);
+        if db.is_empty() {
+            row_step = 1;
+            db.extend(seen.kept.iter().map(|kept| {
+                let truth = rehearsal.render_truth(kept.shown.content_ns);
+                psnr_rgb_db(&kept.rgba, &without_alpha(&truth))
+            }));
+        }
+        let row_step = (!db.is_empty()).then_some(row_step);
+        Self { db, row_step }
     }
-    let against_truth = |kept: &Kept| {
-        let truth = rehearsal.render_truth(kept.shown.content_ns);
-        psnr_rgb_db(&kept.rgba, &without_alpha(&truth))
-    };
-    seen.kept.iter().map(against_truth).collect()
 }
 
 fn changed_real_frames(seen: &Seen) -> u64 {
@@ -274,55 +318,6 @@ fn changed_real_frames(seen: &Seen) -> u64 {
         shown.kind == OutputKind::Real && shown.psnr_rgb_db.is_some_and(|db| db < 100.0)
     };
     seen.frames.iter().filter(is_changed).count() as u64
-}
-
-/// Standard deviation of the content-time step from one refresh to the next, over the refresh
-/// interval. A refresh without a new picture shows the last one again: a step of 0. Pictures that
-/// were shown but not received leave the steps around them out.
-fn content_judder(frames: &[Shown], refresh_hz: f64) -> Option<f64> {
-    let mut steps = Vec::new();
-    for pair in frames.windows(2) {
-        let refreshes = (pair[1].present_at - pair[0].present_at).as_secs_f64() * refresh_hz;
-        let step = (pair[1].content_ns as f64 - pair[0].content_ns as f64) / 1e9 * refresh_hz;
-        if pair[1].not_received == pair[0].not_received {
-            let repeats = (refreshes.round() - 1.0).max(0.0) as usize;
-            steps.extend(std::iter::repeat_n(0.0, repeats));
-            steps.push(step);
-        }
-    }
-    let centre = mean(&steps)?;
-    let squares: Vec<f64> = steps.iter().map(|step| (step - centre) * (step - centre)).collect();
-    mean(&squares).map(f64::sqrt)
-}
-
-fn events(submissions: &Submissions, seen: &Seen, rehearsal: &Rehearsal) -> Vec<TimelineEvent> {
-    let (Some(first), Some(last)) = (seen.frames.first(), seen.frames.last()) else {
-        return Vec::new();
-    };
-    let start = first.present_at + (last.present_at - first.present_at).scale(1, 3);
-    let at_ms = |time: MonoTime| (time - start).as_ms_f64();
-    let start_content_ns = (start - first.present_at).as_ns() as f64 + first.content_ns as f64;
-    let content_ms = |content_ns: u64| (content_ns as f64 - start_content_ns) / 1e6;
-    let is_drawn = |time: MonoTime| time >= start && time < start + TIMELINE_SPAN;
-    let interval = rehearsal.key_interval_ns;
-    let keys = submissions.sent.iter().filter(|(_, sent_at)| is_drawn(*sent_at)).map(
-        |&(index, sent_at)| TimelineEvent::Key {
-            arrived_at_ms: at_ms(sent_at),
-            content_ms: content_ms(index * interval),
-        },
-    );
-    let presents = seen.frames.iter().filter(|shown| is_drawn(shown.present_at)).map(|shown| {
-        TimelineEvent::Present {
-            at_ms: at_ms(shown.present_at),
-            kind: match shown.kind {
-                OutputKind::Real => PresentKind::Real,
-                OutputKind::Synthesised => PresentKind::Synthesised,
-                OutputKind::Repeated => PresentKind::Repeated,
-            },
-            content_ms: Some(content_ms(shown.content_ns)),
-        }
-    });
-    keys.chain(presents).collect()
 }
 
 /// None of nothing.
@@ -348,22 +343,8 @@ fn median_ms(spans: &[MonoSpan]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use foreframe_engine::MonoSpan;
+    use foreframe_engine::MonoTime;
     use foreframe_engine::backend::choice::BackendChoice;
-
-    /// Frames shown at the given refreshes of a 100 Hz display, content times in ms.
-    fn shown(frames: &[(i64, u64)]) -> Vec<Shown> {
-        let frame = |&(refresh, content_ms): &(i64, u64)| Shown {
-            kind: OutputKind::Synthesised,
-            key_index: 0,
-            phase: 0.0,
-            content_ns: content_ms * 1_000_000,
-            present_at: MonoTime::ZERO + MonoSpan::from_ms(10 * refresh),
-            not_received: 0,
-            psnr_rgb_db: None,
-        };
-        frames.iter().map(frame).collect()
-    }
 
     fn settings(out: &Path) -> Settings {
         Settings {
@@ -374,7 +355,7 @@ mod tests {
             refresh_hz: 120.0,
             backend: BackendChoice::Cpu,
             method: foreframe_engine::Method::Linear,
-            sink: "shm".to_owned(),
+            sink: SinkSpec::Shm,
             out: out.to_owned(),
         }
     }
@@ -386,7 +367,7 @@ mod tests {
             fs::write(folder.path().join(name), "old").unwrap();
         }
         let settings = settings(folder.path());
-        prepare(&settings.out).unwrap();
+        prepare(&settings.out, &settings.sink).unwrap();
         let rehearsal = Rehearsal::render(&settings, &crate::output::Output::new(true));
         let (submissions, seen) = (Submissions::default(), Seen::default());
         let mut summary = Summary::new(&settings, &rehearsal, &submissions, &seen);
@@ -405,23 +386,84 @@ mod tests {
     }
 
     #[test]
-    fn even_steps_have_no_judder() {
-        let judder = content_judder(&shown(&[(0, 0), (1, 10), (2, 20), (3, 30)]), 100.0);
-        assert!(judder.unwrap() < 1e-9);
+    fn frames_of_an_earlier_sink_are_removed_and_those_of_this_one_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let frames = folder.path().join("frames");
+        fs::create_dir(&frames).unwrap();
+        for name in ["frame_000000.png", "frame_000361.png", "frame_7.png", "mine.png"] {
+            fs::write(frames.join(name), "old").unwrap();
+        }
+        let sink = SinkSpec::Png(frames.clone());
+        prepare(&folder.path().join("out"), &sink).unwrap();
+        let names = fs::read_dir(&frames).unwrap().map(|entry| entry.unwrap().file_name());
+        let mut names: Vec<_> = names.collect();
+        names.sort();
+        assert_eq!(names, ["frame_7.png", "mine.png"]);
+        prepare(&folder.path().join("out"), &SinkSpec::Png(folder.path().join("none yet")))
+            .unwrap();
+        let settings = Settings { sink, ..settings(folder.path()) };
+        let rehearsal = Rehearsal::render(&settings, &crate::output::Output::new(true));
+        let summary =
+            Summary::new(&settings, &rehearsal, &Submissions::default(), &Seen::default());
+        let named = format!("png:{}", frames.display());
+        assert!(summary.text().contains(&named), "{}", summary.text());
     }
 
     #[test]
-    fn a_refresh_that_repeats_a_picture_is_judder() {
-        let judder = content_judder(&shown(&[(0, 0), (1, 10), (3, 30), (4, 40)]), 100.0).unwrap();
-        let expected = (0.5_f64).sqrt();
-        assert!((judder - expected).abs() < 1e-9, "steps 1, 0, 2, 1: found {judder}");
+    fn what_was_compared_is_told_as_it_was() {
+        let folder = tempfile::tempdir().unwrap();
+        let settings = settings(folder.path());
+        let rehearsal = Rehearsal::render(&settings, &crate::output::Output::new(true));
+        let shown = Shown {
+            kind: OutputKind::Synthesised,
+            key_index: 0,
+            phase: 0.4,
+            content_ns: 10_000_000,
+            present_at: MonoTime::ZERO,
+            not_received: 0,
+            psnr_rgb_db: None,
+        };
+        let kept = vec![Kept { shown, rgba: rehearsal.render_truth(shown.content_ns) }];
+        let on_grid = Shown { psnr_rgb_db: Some(30.0), ..shown };
+        for (frames, kept, expected) in [
+            (
+                vec![on_grid],
+                kept.clone(),
+                "30.0 dB PSNR on average, 30.0 dB at worst, 1 of 0 in-betweens compared, 1 row in 8",
+            ),
+            (
+                vec![shown],
+                kept,
+                "100.0 dB PSNR on average, 100.0 dB at worst, 1 of 0 in-betweens compared, all rows",
+            ),
+            (
+                vec![shown],
+                Vec::new(),
+                "none PSNR on average, none at worst, 0 of 0 in-betweens compared",
+            ),
+        ] {
+            let seen = Seen { frames, kept };
+            let summary = Summary::new(&settings, &rehearsal, &Submissions::default(), &seen);
+            let text = summary.text();
+            assert!(
+                text.lines().any(|line| line == format!("error               {expected}")),
+                "{text}"
+            );
+        }
     }
 
     #[test]
-    fn steps_around_frames_that_were_not_received_do_not_count() {
-        let mut frames = shown(&[(0, 0), (1, 10), (3, 30), (4, 40)]);
-        frames[2].not_received = 1;
-        frames[3].not_received = 1;
-        assert!(content_judder(&frames, 100.0).unwrap() < 1e-9);
+    fn a_refresh_without_a_new_picture_is_what_the_daemon_counted() {
+        let folder = tempfile::tempdir().unwrap();
+        let settings = settings(folder.path());
+        let rehearsal = Rehearsal::render(&settings, &crate::output::Output::new(true));
+        let kind = |repeated, dropped| {
+            let summary =
+                Summary::new(&settings, &rehearsal, &Submissions::default(), &Seen::default());
+            Summary { repeated, dropped, ..summary }.unshown_kind()
+        };
+        assert_eq!(kind(0, 3), PresentKind::Dropped);
+        assert_eq!(kind(3, 0), PresentKind::Repeated);
+        assert_eq!(kind(3, 1), PresentKind::Repeated, "either way the one before was shown again");
     }
 }

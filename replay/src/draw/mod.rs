@@ -1,14 +1,17 @@
-//! Drawing for the tool's own pictures: a canvas over tiny-skia, and text over ab_glyph.
+//! Drawing for the tool's own pictures: a canvas over tiny-skia, text over ab_glyph, and drawings
+//! that become pixels or SVG.
 //!
 //! Software only and with a built-in font, so that a picture has the same pixels on every machine.
 //! Positions are pixels from the top left corner; nothing outside the canvas is drawn, and nothing
 //! fails: what does not fit is clipped.
 
 mod canvas;
+mod drawing;
 pub mod palette;
 mod text;
 
 pub use canvas::Canvas;
+pub use drawing::Drawing;
 pub use text::{Anchor, TextStyle, text_width};
 
 /// A picture in 8-bit sRGB, alpha ignored: `width * height` pixels of 4 bytes, row by row.
