@@ -3,10 +3,10 @@
 //! A machine without any driver skips such tests: each says so on standard error, with a count. The
 //! variable [`REQUIRED`] names adapters that have to be there, and then nothing is skipped.
 
+use std::collections::BTreeSet;
 use std::env;
 use std::io::{self, Write};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::{Gpu, GpuAdapter, adapters};
 
@@ -20,7 +20,7 @@ pub const REQUIRED: &str = "FOREFRAME_REQUIRE_ADAPTERS";
 /// If an adapter that [`REQUIRED`] names is missing.
 #[must_use]
 pub fn test_adapters(test: &str) -> Vec<GpuAdapter> {
-    static SKIPPED: AtomicUsize = AtomicUsize::new(0);
+    static SKIPPED: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
     let mut found = adapters();
     found.retain(|adapter| adapter.facts.unusable.is_none());
     let required = env::var(REQUIRED).unwrap_or_default();
@@ -30,10 +30,13 @@ pub fn test_adapters(test: &str) -> Vec<GpuAdapter> {
         assert!(found.iter().any(is_it), "{REQUIRED} names {name}, which is not among {found:?}");
     }
     if found.is_empty() {
-        let count = SKIPPED.fetch_add(1, Ordering::Relaxed) + 1;
-        // Straight to the stream: the test runner swallows what tests print.
-        let said = writeln!(io::stderr(), "skipped ({count}): {test}: no GPU adapter");
-        drop(said);
+        let mut skipped = SKIPPED.lock().unwrap_or_else(PoisonError::into_inner);
+        if skipped.insert(test.to_owned()) {
+            let count = skipped.len();
+            // Straight to the stream: the test runner swallows what tests print.
+            let said = writeln!(io::stderr(), "skipped ({count}): {test}: no GPU adapter");
+            drop(said);
+        }
     }
     found
 }
