@@ -9,12 +9,15 @@
 //! per degree (cpd), pixels per degree (ppd), Hz, seconds. All functions of real numbers go through
 //! `libm`, so that one input gives one output on every machine.
 
+pub mod banding;
+pub mod compensation;
 pub mod detection;
 pub mod display;
 mod error;
 pub mod flicker;
 pub mod motion_quality;
 pub mod plane;
+pub mod retina;
 pub mod sensitivity;
 pub mod tracking;
 
