@@ -16,9 +16,11 @@ pub mod display;
 mod error;
 pub mod flicker;
 pub mod motion_quality;
+pub mod multiplex;
 pub mod plane;
 pub mod retina;
 pub mod sensitivity;
 pub mod tracking;
+pub mod window;
 
 pub use error::PerceptionError;
