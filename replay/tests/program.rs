@@ -2,8 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a helper that cannot go on fails its test")]
 
+use std::fs;
 use std::path::PathBuf;
-use std::process::{Command, Stdio};
+use std::process::{Command, Output, Stdio};
 
 use foreframe_engine::MonoSpan;
 use foreframe_protocol::socket::Channel;
@@ -53,6 +54,96 @@ fn a_file_that_is_not_there_is_no_wrong_usage_and_is_told_once() {
 }
 
 #[test]
+fn what_is_no_capture_is_told_in_one_line_that_says_what_was_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let status = foreframe()
+        .args(["scenes", "static", "--size", "32x18", "--seconds", "0.02", "-o"])
+        .arg(at("whole.mcap"))
+        .stdout(Stdio::null())
+        .status()
+        .unwrap();
+    assert!(status.success());
+    let whole = fs::read(at("whole.mcap")).unwrap();
+    fs::create_dir(at("folder")).unwrap();
+    fs::write(at("empty"), "").unwrap();
+    fs::write(at("text"), "this is no capture").unwrap();
+    fs::write(at("begun"), &whole[..20]).unwrap();
+    let commands = ["info", "replay", "score --ratio 2", "export -o out"];
+    let files = [
+        ("missing", "No such file"),
+        ("folder", "expected a capture, found a folder"),
+        ("empty", "expected an MCAP file"),
+        ("text", "found [74, 68, 69, 73"),
+        ("begun", "found the end after 20 bytes"),
+    ];
+    for command in commands {
+        for (file, expected) in files {
+            let mut program = foreframe();
+            program.args(command.split(' ')).arg(file).current_dir(folder.path());
+            assert_fails(program, expected);
+        }
+        let mut program = foreframe();
+        program.args(command.split(' ')).arg("whole.mcap").current_dir(folder.path());
+        assert!(program.output().unwrap().status.success(), "{command} of a whole capture");
+    }
+    // Opens, and has no whole frame: only `info` has something to tell.
+    let first_frame = whole.len() / 2;
+    let lengths = (0..first_frame).rev().step_by(97);
+    let cut = lengths.map(|length| {
+        fs::write(at("cut"), &whole[..length]).unwrap();
+        foreframe().args(["info", "--json", "cut"]).current_dir(folder.path()).output().unwrap()
+    });
+    let is_begun =
+        |output: &Output| String::from_utf8_lossy(&output.stdout).contains("\"frames\":0,");
+    assert!(cut.into_iter().any(|output| is_begun(&output)), "a cut before the first frame's end");
+    for command in ["replay", "score --ratio 2", "export -o out2"] {
+        let mut program = foreframe();
+        program.args(command.split(' ')).arg("cut").current_dir(folder.path());
+        let output = program.output().unwrap();
+        let errors = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{command}: {errors}");
+        let lines: Vec<_> = errors.lines().collect();
+        assert_eq!(lines.len(), 2, "a warning and an error: {errors}");
+        assert!(
+            lines[0].contains("the file ends early") && lines[1].contains("expected"),
+            "{errors}"
+        );
+    }
+}
+
+#[test]
+fn a_folder_that_is_no_sequence_is_told_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("no-side-cars")).unwrap();
+    fs::write(folder.path().join("no-side-cars/frame_0000.exr"), "x").unwrap();
+    fs::create_dir(folder.path().join("broken")).unwrap();
+    fs::write(folder.path().join("broken/frame_0000.json"), "{").unwrap();
+    fs::write(folder.path().join("file"), "x").unwrap();
+    for (name, expected) in [
+        ("missing", "No such file"),
+        ("file", "Not a directory"),
+        ("no-side-cars", "expected frames with side-cars frame_NNNN.json, found none"),
+        ("broken", "frame_0000.json: expected the side-car of a frame"),
+    ] {
+        let mut program = foreframe();
+        program.args(["import", name, "-o", "out.mcap"]).current_dir(folder.path());
+        assert_fails(program, expected);
+        assert!(!folder.path().join("out.mcap").exists(), "{name}");
+    }
+}
+
+/// Runs a command that fails with code 1 and one line that says `expected`.
+fn assert_fails(mut program: Command, expected: &str) {
+    let output = program.output().unwrap();
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{program:?}: {errors}");
+    assert_eq!(errors.lines().count(), 1, "{program:?}: {errors}");
+    assert_eq!(errors.matches(expected).count(), 1, "{program:?}: {errors}");
+    assert!(output.stdout.is_empty(), "{program:?}");
+}
+
+#[test]
 fn the_daemon_of_a_demo_that_is_killed_ends() {
     let folder = tempfile::tempdir().unwrap();
     let mut demo = foreframe()
@@ -83,7 +174,7 @@ fn the_daemon_of_a_demo_that_is_killed_ends() {
 
 /// The socket of the demo that has this folder for temporary files.
 fn socket_below(folder: &tempfile::TempDir) -> Option<PathBuf> {
-    let entries = std::fs::read_dir(folder.path()).unwrap();
+    let entries = fs::read_dir(folder.path()).unwrap();
     let folders = entries.map(|entry| entry.unwrap().path());
     let sockets = folders.map(|folder| folder.join("private/daemon.sock"));
     sockets.into_iter().find(|socket| socket.exists())

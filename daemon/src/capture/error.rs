@@ -6,14 +6,19 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CaptureError {
-    /// The file could not be opened or created.
-    #[error("cannot open {path}", path = path.display())]
+    /// The file could not be opened or created. Callers say which one.
+    #[error("cannot open the file")]
     Open {
         /// Which file.
         path: PathBuf,
         /// Why.
         source: std::io::Error,
     },
+    /// A folder where a file should be.
+    #[error(
+        "expected a capture, found a folder: `foreframe import` makes a capture of EXR frames in one"
+    )]
+    Folder,
     /// Reading or writing the file failed.
     #[error("{doing}")]
     Io {

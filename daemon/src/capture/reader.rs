@@ -94,8 +94,11 @@ impl Capture {
     /// If the file cannot be read, is no capture, is of another version, or ends before the first
     /// stream was described.
     pub fn open(path: &Path) -> Result<Self, CaptureError> {
-        let file = File::open(path)
-            .map_err(|source| CaptureError::Open { path: path.to_owned(), source })?;
+        let cannot_open = |source| CaptureError::Open { path: path.to_owned(), source };
+        let file = File::open(path).map_err(cannot_open)?;
+        if file.metadata().map_err(cannot_open)?.is_dir() {
+            return Err(CaptureError::Folder);
+        }
         Self::from_source(file)
     }
 }

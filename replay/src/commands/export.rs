@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use crate::exr_frames::export;
 use crate::output::Output;
+use crate::recording::capture::warnings;
 
 /// Arguments of `foreframe export`.
 #[derive(clap::Args, Debug)]
@@ -35,6 +36,9 @@ struct Report {
 pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
     let named = || args.file.display().to_string();
     let capture = Capture::open(&args.file).with_context(named)?;
+    for warning in warnings(&capture.info().with_context(named)?) {
+        eprintln!("foreframe: {}: {warning}", named());
+    }
     let bar = output.progress("exporting", 0);
     let frames = export::export(&capture, args.stream, &args.output, |done, all| {
         bar.set_length(all);

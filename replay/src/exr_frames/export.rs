@@ -51,6 +51,10 @@ pub fn export(
         .filter(|(_, times)| times.stream == stream)
         .map(|(number, _)| number)
         .collect();
+    ensure!(
+        !numbers.is_empty(),
+        "expected at least one whole frame in stream {stream}, found none"
+    );
     let name = folder.display();
     fs::create_dir_all(folder).with_context(|| format!("making the folder {name}"))?;
     ensure!(

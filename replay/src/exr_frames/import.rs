@@ -111,7 +111,9 @@ pub fn import(
         progress(imported.frames, all);
     }
     let file = writer.finish()?.into_inner().context("writing the capture")?;
-    file.persist(out).with_context(|| format!("writing {}", out.display()))?;
+    file.persist(out)
+        .map_err(|failed| failed.error)
+        .with_context(|| format!("writing {}", out.display()))?;
     Ok(imported)
 }
 

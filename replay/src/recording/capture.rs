@@ -9,10 +9,26 @@ use std::path::Path;
 use anyhow::Context as _;
 use foreframe_engine::{KeyInput, MonoTime, PlaneInput, StreamFormat};
 use foreframe_protocol::{PlaneDescriptor, PlaneKind, Submit};
-use foreframed::capture::{Capture, CapturedPlane, PIXELS_PER_DEGREE, PlaneInfo, ReadAt};
+use foreframed::capture::{
+    Capture, CaptureInfo, CapturedPlane, PIXELS_PER_DEGREE, PlaneInfo, ReadAt,
+};
 use foreframed::ingest;
 
 use super::{Frame, FrameHead, OwnedPlane, Recording, Wanted};
+
+/// What a user should know about a file that is not whole: one line each.
+#[must_use]
+pub fn warnings(info: &CaptureInfo) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if let Some(tail) = &info.tail {
+        warnings.push(format!("the file ends early, its last whole frame is used: {tail}"));
+    }
+    warnings.extend(info.damaged.iter().map(|damage| format!("a part is skipped: {damage}")));
+    if info.gaps > 0 {
+        warnings.push(format!("{} frames arrived and were not recorded", info.gaps));
+    }
+    warnings
+}
 
 /// The first stream of a capture that has frames.
 #[derive(Debug)]
@@ -99,14 +115,7 @@ impl<S: ReadAt> CaptureRecording<S> {
     /// If the first frame's record cannot be read.
     pub fn warnings(&self) -> anyhow::Result<Vec<String>> {
         let info = self.capture.info()?;
-        let mut warnings = Vec::new();
-        if let Some(tail) = &info.tail {
-            warnings.push(format!("the file ends early, its last whole frame is used: {tail}"));
-        }
-        warnings.extend(info.damaged.iter().map(|damage| format!("a part is skipped: {damage}")));
-        if info.gaps > 0 {
-            warnings.push(format!("{} frames arrived and were not recorded", info.gaps));
-        }
+        let mut warnings = warnings(&info);
         if info.streams.len() > 1 {
             let (used, all) = (self.stream + 1, info.streams.len());
             warnings.push(format!("only stream {used} of {all} is used"));

@@ -8,7 +8,7 @@
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 
-use anyhow::Context as _;
+use anyhow::{Context as _, ensure};
 use foreframe_engine::backend::gpu::Gpu;
 use foreframe_engine::{ColorPlane, Engine, EngineConfig, Method, MonoTime, Plane, StreamFormat};
 use foreframed::sink::srgb::SrgbConverter;
@@ -47,6 +47,7 @@ pub fn score_recording(
     mut on_key: impl FnMut(),
 ) -> anyhow::Result<CaptureScore> {
     let plan = Plan::new(recording.heads(), options.ratio);
+    ensure!(!plan.keys.is_empty(), "expected at least one whole frame, found no frames");
     let reader = KeyReader::new(recording.format(), &plan)?;
     let format = *reader.format();
     let converter = SrgbConverter::new(&format);
