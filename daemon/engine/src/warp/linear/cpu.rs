@@ -24,6 +24,10 @@ pub fn warp_linear(
     scratch: &mut LinearScratch,
     out: &mut ColorPlane,
 ) {
+    if scratch.source.is_still() {
+        out.copy_from(&key.color);
+        return;
+    }
     scratch.resolve(pool, map, phase);
     let frame = Frame { field: scratch, map, valid: key.valid, phase, one_cell: one_cell(map) };
     match (&key.color, out) {

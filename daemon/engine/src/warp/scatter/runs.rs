@@ -10,6 +10,7 @@ use std::ops::Range;
 
 use rayon::ThreadPool;
 
+use super::source::Reach;
 use super::{NO_SOURCE, SOURCE_BITS, SourceField, phase_in_cells, shift};
 use crate::bands::for_each_band;
 use crate::field::FieldMap;
@@ -158,7 +159,7 @@ impl Band<'_> {
         let first_row = self.first_row as isize;
         let mut landing =
             Landing { right_by: [0; BLOCK], down_by: [0; BLOCK], x: [0; BLOCK], y: [0; BLOCK] };
-        for (y, &[slowest, fastest]) in (0_u32..).zip(source.reach.data()) {
+        for (y, &Reach { slowest, fastest, .. }) in (0_u32..).zip(source.reach.data()) {
             let land = |v: i16| (y as isize) + (shift(v, self.scale[1]) >> 8) as isize;
             let (from, to) = (land(slowest) - first_row, land(fastest) + 1 - first_row);
             if to < 0 || from >= rows {

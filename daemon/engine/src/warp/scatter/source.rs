@@ -14,8 +14,19 @@ pub struct SourceField {
     pub velocity: Plane<Velocity>,
     /// Depth key of the surface that the velocity is of.
     pub depth: Plane<u32>,
-    /// Smallest and largest downward velocity of each row, in one column.
-    pub(super) reach: Plane<[i16; 2]>,
+    /// How each row moves, in one column.
+    pub(super) reach: Plane<Reach>,
+}
+
+/// How the cells of a row move.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Reach {
+    /// Smallest downward velocity.
+    pub(super) slowest: i16,
+    /// Largest downward velocity.
+    pub(super) fastest: i16,
+    /// Whether any cell moves, in whatever direction.
+    moves: bool,
 }
 
 impl SourceField {
@@ -23,6 +34,7 @@ impl SourceField {
     ///
     /// Without depth, a faster surface counts as nearer, in steps of a pixel: it is what parallax
     /// does to a moving camera, and better than a fold-over that shows both surfaces at random.
+    /// Depth is left out where nothing moves: nothing can fold over.
     pub fn update(&mut self, pool: &ThreadPool, key: &KeyFrame) {
         let (width, height) = (key.velocity.width(), key.velocity.height());
         self.velocity.resize(width, height);
@@ -35,14 +47,18 @@ impl SourceField {
             &mut self.reach,
             #[inline(always)]
             |y, row, reach| {
-                let [mut slowest, mut fastest] = [i16::MAX, i16::MIN];
+                let [mut slowest, mut fastest, mut moved] = [i16::MAX, i16::MIN, 0];
                 for (held, &velocity) in row.iter_mut().zip(key.velocity.row(y)) {
                     *held = if velocity.is_trackable() { velocity } else { Velocity::default() };
                     (slowest, fastest) = (slowest.min(held.y), fastest.max(held.y));
+                    moved |= held.x | held.y;
                 }
-                reach[0] = [slowest, fastest];
+                reach[0] = Reach { slowest, fastest, moves: moved != 0 };
             },
         );
+        if self.is_still() {
+            return;
+        }
         let velocity = &self.velocity;
         for_each_row(
             pool,
@@ -58,5 +74,10 @@ impl SourceField {
                 }
             },
         );
+    }
+    /// Whether no cell moves: then every frame is the key as it is.
+    #[must_use]
+    pub fn is_still(&self) -> bool {
+        !self.reach.data().iter().any(|row| row.moves)
     }
 }
