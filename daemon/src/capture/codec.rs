@@ -90,7 +90,7 @@ impl Coding {
     }
 }
 
-/// Level of [`Codec::Zstd`]: higher ones gain 15 % in size and take three times as long.
+/// Level of [`Codec::Zstd`]: the lowest of the regular ones.
 const ZSTD_LEVEL: i32 = 1;
 
 /// xxh3-128 of the raw bytes of a plane.
