@@ -88,12 +88,8 @@ fn all_series(cases: &[Case]) -> Vec<Series> {
     let mut series: Vec<Series> = Vec::new();
     let mut backends: Vec<&str> = Vec::new();
     let mut whats: Vec<String> = Vec::new();
-    let first_scene = cases.first().map_or("", |case| case.scene);
     for case in cases {
         let is_hold = case.method == Method::Hold.name();
-        if is_hold && case.scene != first_scene {
-            continue;
-        }
         let what =
             if is_hold { "hold".to_owned() } else { format!("{} {}", case.scene, case.method) };
         let backend = position_or_push(&mut backends, &case.backend.as_str());
