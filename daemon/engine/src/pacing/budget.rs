@@ -1,7 +1,8 @@
 //! How long before a refresh work has to start: the work itself, and a margin for the hand-over.
 //!
 //! Work is the 95th percentile of recent frames, counted from the planned wake, so that late
-//! scheduling counts as work. The margin widens at once after a miss and shrinks slowly.
+//! scheduling counts as work. A key shown as it is takes a fraction of what an in-between frame
+//! takes, and is estimated apart. The margin widens at once after a miss and shrinks slowly.
 
 use super::recent::Recent;
 use crate::time::MonoSpan;
@@ -29,26 +30,50 @@ pub enum WorkEstimate {
     Constant(MonoSpan),
 }
 
+/// What a picture shows.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Shows {
+    /// The newest key as it is.
+    Key,
+    /// Anything else.
+    InBetween,
+}
+
 /// What has to happen before a refresh, and how long it takes.
 #[derive(Clone, Debug)]
 pub(super) struct Budget {
     estimate: WorkEstimate,
+    keys: RecentWork,
+    in_betweens: RecentWork,
+    margin: MonoSpan,
+}
+
+/// What recent pictures of one kind took.
+#[derive(Clone, Debug, Default)]
+struct RecentWork {
     work: Recent<WORK_WINDOW>,
     /// The percentile of `work`. None before anything was measured.
     measured: Option<MonoSpan>,
-    margin: MonoSpan,
 }
 
 impl Budget {
     pub(super) fn new(estimate: WorkEstimate) -> Self {
-        Self { estimate, work: Recent::default(), measured: None, margin: MARGIN_FLOOR }
+        let [keys, in_betweens] = [(); 2].map(|()| RecentWork::default());
+        Self { estimate, keys, in_betweens, margin: MARGIN_FLOOR }
     }
 
-    /// Expected time from wake to the picture being ready. A quarter of a refresh before anything was measured.
-    pub(super) fn work(&self, refresh_interval: MonoSpan) -> MonoSpan {
+    /// Expected time from wake to the picture being ready. Of a kind that was not measured yet the
+    /// same as of the other, and before anything was measured a quarter of a refresh.
+    pub(super) fn work(&self, shows: Shows, refresh_interval: MonoSpan) -> MonoSpan {
+        let (own, other) = match shows {
+            Shows::Key => (&self.keys, &self.in_betweens),
+            Shows::InBetween => (&self.in_betweens, &self.keys),
+        };
         match self.estimate {
             WorkEstimate::Constant(work) => work.max(MonoSpan::ZERO),
-            WorkEstimate::Measured => self.measured.unwrap_or(refresh_interval.scale(1, 4)),
+            WorkEstimate::Measured => {
+                own.measured.or(other.measured).unwrap_or(refresh_interval.scale(1, 4))
+            }
         }
     }
 
@@ -63,9 +88,13 @@ impl Budget {
         self.margin.min(refresh_interval.scale(1, 2))
     }
 
-    pub(super) fn on_work(&mut self, work: MonoSpan) {
-        self.work.push(work.max(MonoSpan::ZERO));
-        self.measured = self.work.percentile(WORK_PERCENTILE);
+    pub(super) fn on_work(&mut self, shows: Shows, work: MonoSpan) {
+        let recent = match shows {
+            Shows::Key => &mut self.keys,
+            Shows::InBetween => &mut self.in_betweens,
+        };
+        recent.work.push(work.max(MonoSpan::ZERO));
+        recent.measured = recent.work.percentile(WORK_PERCENTILE);
     }
 
     pub(super) fn on_good(&mut self) {
@@ -91,12 +120,23 @@ mod tests {
     #[test]
     fn one_spike_in_a_window_does_not_move_the_estimate_but_many_do() {
         let mut budget = Budget::new(WorkEstimate::Measured);
-        assert_eq!(budget.work(REFRESH), MonoSpan::from_ms(2));
-        (0..WORK_WINDOW).for_each(|_| budget.on_work(MonoSpan::from_ms(3)));
-        budget.on_work(MonoSpan::from_ms(30));
-        assert_eq!(budget.work(REFRESH), MonoSpan::from_ms(3));
-        (0..5).for_each(|_| budget.on_work(MonoSpan::from_ms(5)));
-        assert_eq!(budget.work(REFRESH), MonoSpan::from_ms(5));
+        let work = |budget: &Budget| budget.work(Shows::InBetween, REFRESH);
+        assert_eq!(work(&budget), MonoSpan::from_ms(2));
+        (0..WORK_WINDOW).for_each(|_| budget.on_work(Shows::InBetween, MonoSpan::from_ms(3)));
+        budget.on_work(Shows::InBetween, MonoSpan::from_ms(30));
+        assert_eq!(work(&budget), MonoSpan::from_ms(3));
+        (0..5).for_each(|_| budget.on_work(Shows::InBetween, MonoSpan::from_ms(5)));
+        assert_eq!(work(&budget), MonoSpan::from_ms(5));
+    }
+
+    #[test]
+    fn keys_and_in_betweens_are_estimated_apart_once_both_were_measured() {
+        let mut budget = Budget::new(WorkEstimate::Measured);
+        budget.on_work(Shows::InBetween, MonoSpan::from_ms(6));
+        assert_eq!(budget.work(Shows::Key, REFRESH), MonoSpan::from_ms(6));
+        budget.on_work(Shows::Key, MonoSpan::from_ms(1));
+        assert_eq!(budget.work(Shows::Key, REFRESH), MonoSpan::from_ms(1));
+        assert_eq!(budget.work(Shows::InBetween, REFRESH), MonoSpan::from_ms(6));
     }
 
     #[test]

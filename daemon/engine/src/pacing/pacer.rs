@@ -1,6 +1,6 @@
 //! The state machine: joins grid, content clock, cadence and budget into plans.
 
-use super::budget::{Budget, WorkEstimate};
+use super::budget::{Budget, Shows, WorkEstimate};
 use super::cadence::KeyCadence;
 use super::content::{ContentClock, KeyTiming};
 use super::refresh::RefreshTracker;
@@ -77,8 +77,10 @@ pub struct PacerStatus {
     pub phase_error: Option<MonoSpan>,
     /// Present time minus content time of the newest started frame.
     pub delay: Option<MonoSpan>,
-    /// Expected time from wake to the picture being ready.
+    /// Expected time from wake to an in-between frame being ready.
     pub work: MonoSpan,
+    /// The same for a key that is shown as it is.
+    pub key_work: MonoSpan,
     /// Time from there to the refresh.
     pub margin: MonoSpan,
     /// Events so far.
@@ -102,6 +104,8 @@ pub struct Pacer {
     newest: Option<MonoTime>,
     last_target: Option<MonoTime>,
     last_content: Option<MonoTime>,
+    /// What the frame that was started last shows.
+    in_work: Shows,
     slack: Option<MonoSpan>,
     counts: PacerCounts,
 }
@@ -119,6 +123,7 @@ impl Pacer {
             newest: None,
             last_target: None,
             last_content: None,
+            in_work: Shows::InBetween,
             slack: None,
             counts: PacerCounts::default(),
         }
@@ -152,11 +157,27 @@ impl Pacer {
     /// [`start`](Self::start) takes its refresh.
     pub fn plan(&mut self, now: MonoTime) -> Plan {
         self.refresh.anchor_at(now + self.budget());
-        let present_at = self.first_reachable(now);
+        let (shows, present_at) = self.next_picture(now);
         let hand_over = self.budget.hand_over(self.refresh.interval());
         let submit_by = (present_at - hand_over).max(now);
-        let wake_at = (present_at - self.budget()).max(now);
+        let wake_at = (present_at - self.budget_of(shows)).max(now);
         Plan { wake_at, submit_by, present_at, content_time: self.content_time_at(present_at) }
+    }
+
+    /// The refresh to make the next picture for: one that an in-between frame can make, or an
+    /// earlier one that shows a key as it is, which takes less.
+    fn next_picture(&self, now: MonoTime) -> (Shows, MonoTime) {
+        let present_at = self.first_reachable(now);
+        let of_key = self.first_reachable_with(now, self.budget_of(Shows::Key));
+        if of_key <= present_at && self.shows_key(self.content_time_at(of_key)) {
+            (Shows::Key, of_key)
+        } else {
+            (Shows::InBetween, present_at)
+        }
+    }
+
+    fn shows_key(&self, content_time: Option<MonoTime>) -> bool {
+        !self.interpolates && content_time.is_some() && content_time == self.newest
     }
 
     /// The picture of `plan` is being made: its refresh is taken.
@@ -165,7 +186,8 @@ impl Pacer {
             return; // the same plan again: its refresh is taken already
         }
         self.last_target = Some(plan.present_at);
-        let shows_key = !self.interpolates && plan.content_time == self.newest;
+        let shows_key = self.shows_key(plan.content_time);
+        self.in_work = if shows_key { Shows::Key } else { Shows::InBetween };
         let delay = match self.newest {
             // The line goes on from the key: if only the frame moved, the next one would move back.
             Some(newest) if shows_key => Some(plan.present_at - newest),
@@ -178,9 +200,10 @@ impl Pacer {
         self.debug_verify();
     }
 
-    /// Making a frame took `work`, from its planned wake to the picture being ready.
+    /// Making the frame that was started last took `work`, from its planned wake to the picture
+    /// being ready.
     pub fn on_work(&mut self, work: MonoSpan) {
-        self.budget.on_work(work);
+        self.budget.on_work(self.in_work, work);
         self.debug_verify();
     }
 
@@ -220,7 +243,8 @@ impl Pacer {
             slack: self.slack,
             phase_error: self.slack.map(|slack| wrapped(slack - TARGET_SLACK, interval)),
             delay: self.last_target.and_then(delay),
-            work: self.work(),
+            work: self.budget.work(Shows::InBetween, interval),
+            key_work: self.budget.work(Shows::Key, interval),
             margin: self.margin(),
             counts: PacerCounts { distrusted_timestamps: self.refresh.outliers(), ..self.counts },
         }
@@ -232,22 +256,26 @@ impl Pacer {
         self.debug_verify();
     }
 
-    fn work(&self) -> MonoSpan {
-        self.budget.work(self.refresh.interval())
-    }
-
     fn margin(&self) -> MonoSpan {
         self.budget.margin(self.refresh.interval())
     }
 
-    /// Time from wake to refresh.
+    /// Time from wake to the refresh of an in-between frame.
     fn budget(&self) -> MonoSpan {
-        self.work() + self.margin()
+        self.budget_of(Shows::InBetween)
     }
 
-    /// The first refresh that a picture started at `time` can make and that is not taken.
+    fn budget_of(&self, shows: Shows) -> MonoSpan {
+        self.budget.work(shows, self.refresh.interval()) + self.margin()
+    }
+
+    /// The first refresh that an in-between frame started at `time` can make and that is not taken.
     fn first_reachable(&self, time: MonoTime) -> MonoTime {
-        let ready = time + self.budget();
+        self.first_reachable_with(time, self.budget())
+    }
+
+    fn first_reachable_with(&self, time: MonoTime, budget: MonoSpan) -> MonoTime {
+        let ready = time + budget;
         let half = self.refresh.interval().scale(1, 2);
         // Half an interval tells the next refresh from the taken one after the grid has moved.
         let free = self.last_target.map_or(MonoTime::ZERO, |taken| taken + half);
