@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    adapters, bench, completions, demo, export, import, info, man, pacing, replay, scenes, score,
-    serve,
+    adapters, bench, completions, demo, export, import, info, man, pacing, perception, replay,
+    scenes, score, serve,
 };
 use crate::output::Output;
 use foreframed::UsageError;
@@ -49,6 +49,8 @@ pub enum Command {
     Adapters(adapters::Args),
     /// Run the pacer against a simulated display and clock.
     Pacing(pacing::Args),
+    /// Ask the models of display and eye: motion quality, flicker, banding and more.
+    Perception(perception::Args),
     /// Print a shell completion script.
     Completions(completions::Args),
     /// Write the man pages.
@@ -91,6 +93,7 @@ impl Cli {
             Command::Bench(args) => bench::run(&args, &output),
             Command::Adapters(args) => adapters::run(&args, &output),
             Command::Pacing(args) => pacing::run(&args, &output),
+            Command::Perception(args) => perception::run(&args, &output),
             Command::Completions(args) => completions::run(&args),
             Command::Man(args) => man::run(&args, &output),
         }
@@ -122,6 +125,16 @@ mod tests {
     fn every_command_line_of_the_readme_is_one_that_exists() {
         let commands = commands(include_str!("../../README.md"));
         assert!(commands.len() >= 7, "found {}", commands.len());
+        for command in commands {
+            let parsed = Cli::try_parse_from(&command);
+            assert!(parsed.is_ok(), "{}: {}", command.join(" "), parsed.unwrap_err());
+        }
+    }
+
+    #[test]
+    fn every_command_line_of_the_page_on_perception_is_one_that_exists() {
+        let commands = commands(include_str!("../../docs/perception.md"));
+        assert_eq!(commands.len(), 8);
         for command in commands {
             let parsed = Cli::try_parse_from(&command);
             assert!(parsed.is_ok(), "{}: {}", command.join(" "), parsed.unwrap_err());

@@ -9,6 +9,7 @@ pub mod import;
 pub mod info;
 pub mod man;
 pub mod pacing;
+pub mod perception;
 pub mod replay;
 pub mod scenes;
 pub mod score;

@@ -1,11 +1,13 @@
-//! The pictures that the tool leaves behind: a contact sheet and a timeline.
+//! The pictures that the tool leaves behind: a contact sheet, a timeline, charts.
 //!
 //! Pure functions from plain structs to a [`tiny_skia::Pixmap`], which encodes itself as PNG. They
 //! read no file and no clock, and know nothing of how the frames were made.
 
+mod chart;
 mod contact_sheet;
 mod timeline;
 
+pub use chart::{ChartLabels, MapAxes, Series, line_chart, map_chart};
 pub use contact_sheet::{ContactSheetRow, contact_sheet};
 pub use timeline::{PresentKind, TimelineEvent, timeline};
 

@@ -77,6 +77,19 @@ fn peak_luminance(technique: Technique, at: &Conditions) -> Result<f64, Percepti
 }
 
 fn blur_px(technique: Technique, at: &Conditions) -> Result<f64, PerceptionError> {
+    let columns = line_on_retina(technique, at)?;
+    let background = columns[1];
+    let above = columns.iter().map(|light| (light - background).max(0.0));
+    let peak = above.clone().fold(0.0, f64::max);
+    Ok(above.sum::<f64>() / peak)
+}
+
+/// Light on the retina across the line, one value per pixel, averaged over a pair of frames. Eyes
+/// follow the line perfectly.
+///
+/// # Errors
+/// If a condition is out of its range.
+pub fn line_on_retina(technique: Technique, at: &Conditions) -> Result<Vec<f64>, PerceptionError> {
     let motion = f64::from(at.motion_px);
     let line = |time: f64| {
         let from = SIDE as f64 / 4.0 + motion * time;
@@ -85,6 +98,7 @@ fn blur_px(technique: Technique, at: &Conditions) -> Result<f64, PerceptionError
             LINE[usize::from(is_line)]
         })
     };
+    PerceptionError::check_positive("refresh_hz", at.refresh_hz)?;
     let motion_px = [f32::from(at.motion_px), 0.0];
     let frames = sequence(technique, 8, at.gamma, motion_px, line)?;
     let lit: Vec<_> = lit_frames(&frames, at.refresh_hz, 1.0).collect();
@@ -93,10 +107,7 @@ fn blur_px(technique: Technique, at: &Conditions) -> Result<f64, PerceptionError
     let image = retinal_image(&lit, 2.0 * pair_s, pair_s, |_, _| gaze)?;
     // Interlacing has other light in even rows than in odd ones; a viewer sees their mean.
     let column = |x: usize| f64::from(image.at(x.cast_signed(), 1) + image.at(x.cast_signed(), 2));
-    let background = column(1);
-    let columns = (0..SIDE).map(|x| (column(x) - background).max(0.0));
-    let peak = columns.clone().fold(0.0, f64::max);
-    Ok(columns.sum::<f64>() / peak)
+    Ok((0..SIDE).map(|x| column(x) / 2.0).collect())
 }
 
 fn flicker(technique: Technique, at: &Conditions) -> Result<f64, PerceptionError> {
