@@ -108,6 +108,17 @@ fn bright_greys_of_srgb_need_more_than_eight_bits_and_dark_ones_more_than_bright
 }
 
 #[test]
+fn a_gradient_has_one_step_per_level() {
+    // Two bits, so three steps over 90 pixels, of which the darkest is seen best.
+    let linear = |codes: [f64; 3]| grey(20.0 + 0.45 * codes[1]);
+    let found = ramp(0.0, 1.0).seen(2, BandWidth::Over(90.0), 56.0, linear).unwrap();
+    let step = Step { from_xyz: grey(20.0), to_xyz: grey(20.15), width_px: 30.0 };
+    assert!((found.achromatic - seen(&step, 56.0).achromatic).abs() < 1e-9, "{found:?}");
+    let less = Step { to_xyz: grey(20.14), ..step };
+    assert!((found.achromatic - seen(&less, 56.0).achromatic).abs() > 1e-3);
+}
+
+#[test]
 fn a_gradient_of_known_width_is_seen_no_more_than_at_the_worst_width() {
     let gradient = ramp(0.3, 0.7);
     let worst = gradient.seen(7, BandWidth::Worst, 56.0, asus()).unwrap().any();

@@ -4,6 +4,9 @@
 //! first holds what is around half a cycle per pixel, each next one an octave less. The last is the
 //! low-pass plane that remains, at 2 cpd or just below: it has to hold all slower change, even of
 //! the whole picture, or a screen that flickers evenly would not flicker at all.
+//!
+//! The frequency that a band is named and weighed by is the published one, the Nyquist frequency of
+//! its layer. Its filter is most open near half of that; the parameters were fitted with the names.
 
 use crate::plane::Plane;
 

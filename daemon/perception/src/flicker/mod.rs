@@ -23,8 +23,10 @@ pub const POOLING_DEG: f64 = 0.36;
 /// How and where a pair of frames is shown.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct FlickerModel {
-    /// Refresh rate: the pair repeats at half of it, Hz.
+    /// Refresh rate, Hz.
     pub refresh_hz: f64,
+    /// Frames after which the pattern repeats: 2 for a pair.
+    pub frames: u32,
     /// Pixels per degree.
     pub ppd: f64,
     /// Sensitivity to flicker.
@@ -39,14 +41,38 @@ impl FlickerModel {
     pub fn new(refresh_hz: f64, ppd: f64) -> Result<Self, PerceptionError> {
         PerceptionError::check_positive("refresh_hz", refresh_hz)?;
         PerceptionError::check_positive("ppd", ppd)?;
-        Ok(Self { refresh_hz, ppd, sensitivity: PyramidOfVisibility::FIT_TO_ALL })
+        let sensitivity = PyramidOfVisibility::FIT_TO_ALL;
+        Ok(Self { refresh_hz, frames: 2, ppd, sensitivity })
+    }
+
+    /// The same for a pattern that repeats after `frames` frames, such as a key and `frames - 1`
+    /// in-between frames. The model was fitted to pairs; for more frames, its frequency is that of
+    /// the pattern.
+    ///
+    /// # Errors
+    /// If there are fewer than 2.
+    pub fn repeating_after(self, frames: u32) -> Result<Self, PerceptionError> {
+        PerceptionError::check("frames of a pattern", "at least 2", frames.into(), frames >= 2)?;
+        Ok(Self { frames, ..self })
+    }
+
+    /// The frequency at which the pattern repeats, Hz: half of the refresh rate for pairs.
+    #[must_use]
+    pub fn flicker_hz(&self) -> f64 {
+        self.refresh_hz / f64::from(self.frames)
+    }
+
+    /// The contrast of a band that half of the viewers see. Above 1 none is seen by so many.
+    #[must_use]
+    pub fn threshold_contrast(&self, cpd: f64, luminance: f64) -> f64 {
+        1.0 / self.sensitivity.sensitivity(self.flicker_hz(), cpd, luminance)
     }
 
     /// Probability of detection for a contrast of 0 to 1 in one band of `cpd`, at a mean luminance
     /// of `luminance` cd/m2 (equations 7.5 and 7.6; for the latter see [`probability`]).
     #[must_use]
     pub fn of_contrast(&self, contrast: f64, cpd: f64, luminance: f64) -> f64 {
-        let seen = self.sensitivity.sensitivity(self.refresh_hz / 2.0, cpd, luminance);
+        let seen = self.sensitivity.sensitivity(self.flicker_hz(), cpd, luminance);
         probability(contrast * seen, SLOPE)
     }
 

@@ -78,6 +78,36 @@ fn bands_have_the_published_frequencies_and_add_up_to_the_picture() {
 }
 
 #[test]
+fn a_grating_is_strongest_in_the_band_of_its_frequency() {
+    // An octave apart, from the finest band to the low-pass plane.
+    for (pixels, expected) in [(3.5, 0), (7.0, 1), (14.0, 2), (28.0, 3), (112.0, 4)] {
+        let phase = |x: usize| core::f32::consts::TAU * x as f32 / pixels;
+        let grating = Plane::from_fn(240, 4, |x, _| libm::sinf(phase(x)));
+        let bands = Bands::split(&grating, PPD);
+        let energy = |plane: &Plane| plane.map(|value| value * value).mean();
+        let energies: Vec<f64> = bands.iter().map(|(plane, _)| energy(plane)).collect();
+        let strongest = (0..5).max_by(|a, b| energies[*a].total_cmp(&energies[*b]));
+        assert_eq!(strongest, Some(expected), "{pixels} px: {energies:?}");
+    }
+}
+
+#[test]
+fn frames_that_come_back_later_flicker_more_and_the_threshold_is_where_half_see_it() {
+    let pair = model(120.0);
+    let three = pair.repeating_after(3).unwrap();
+    assert!((three.flicker_hz() - 40.0).abs() < 1e-12 && (pair.flicker_hz() - 60.0).abs() < 1e-12);
+    assert!(three.of_contrast(0.3, 4.0, 80.0) > pair.of_contrast(0.3, 4.0, 80.0));
+    // A rate of 80 Hz with pairs repeats as often as 120 Hz with three frames.
+    let slow = model(80.0).of_contrast(0.3, 4.0, 80.0);
+    assert!((three.of_contrast(0.3, 4.0, 80.0) - slow).abs() < 1e-12);
+    for (cpd, luminance) in [(1.625, 78.0), (13.0, 20.0)] {
+        let threshold = pair.threshold_contrast(cpd, luminance);
+        assert!((pair.of_contrast(threshold, cpd, luminance) - 0.5).abs() < 1e-12);
+    }
+    assert!(pair.repeating_after(1).is_err());
+}
+
+#[test]
 fn even_flicker_of_full_contrast_has_the_published_probabilities() {
     // Mean 78 cd/m2 where the doubled frame is clipped at 156, and 156 where it is not.
     let at = |luminance| model(120.0).of_contrast(1.0, 1.625, luminance);
