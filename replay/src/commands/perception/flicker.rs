@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use super::{read_png, read_profile, round};
 use crate::draw::palette::heat;
-use crate::options::number;
+use crate::options::{number, whole};
 use crate::output::Output;
 
 #[derive(clap::Args, Debug)]
@@ -24,6 +24,10 @@ pub(super) struct Args {
     #[arg(long, value_name = "HZ", value_parser = number(1.0, 1000.0))]
     #[arg(allow_negative_numbers = true)]
     refresh: f64,
+    /// Frames after which the pattern repeats, 2 to 16: a key and its in-between frames.
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = whole(2, 16))]
+    #[arg(allow_negative_numbers = true)]
+    frames: i32,
     /// Pixels per degree, 1 to 1000.
     #[arg(long, value_name = "PPD", value_parser = number(1.0, 1000.0))]
     #[arg(allow_negative_numbers = true)]
@@ -48,7 +52,9 @@ struct Report {
 pub(super) fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
     let profile = read_profile(&args.profile)?;
     let planes = [luminance(&args.first, &profile)?, luminance(&args.second, &profile)?];
-    let map = FlickerModel::new(args.refresh, args.ppd)?.map(&planes[0], &planes[1])?;
+    let frames = u32::try_from(args.frames)?;
+    let model = FlickerModel::new(args.refresh, args.ppd)?.repeating_after(frames)?;
+    let map = model.map(&planes[0], &planes[1])?;
     if let Some(path) = &args.map {
         write_map(&map, path)?;
     }
