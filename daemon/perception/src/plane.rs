@@ -83,8 +83,7 @@ impl Plane {
         Self { values, ..*self }
     }
 
-    /// Both planes, joined pixel by pixel. They are of one size, or the pixels of the shorter are
-    /// all that is joined.
+    /// Both planes, joined pixel by pixel.
     ///
     /// # Panics
     /// If they differ in size.
