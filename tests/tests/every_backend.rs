@@ -42,7 +42,7 @@ impl Rendered {
     fn digest(&self, method: Method, threads: usize, gpu: Option<&Arc<Gpu>>) -> String {
         let config = EngineConfig {
             method,
-            threads: NonZeroUsize::new(threads).unwrap(),
+            threads: NonZeroUsize::new(threads).expect("a positive number"),
             pixels_per_degree: None,
             timer: || MonoTime::ZERO,
             worker_started: || (),
@@ -60,7 +60,7 @@ impl Rendered {
             let sign = if method.interpolates() { -1 } else { 1 };
             for third in [1, 2] {
                 let shown_at = content_time + INTERVAL.scale(sign * third, 3);
-                engine.synthesise(shown_at, &mut picture).unwrap();
+                engine.synthesise(shown_at, &mut picture).expect("a key was taken in");
                 digester.add(&picture);
             }
         }
@@ -98,7 +98,7 @@ fn push(engine: &mut Engine, key: &RenderedKey, content_time: MonoTime) {
         camera: Some(camera(&key.camera)),
         motion_from_camera: Some(camera(&key.motion_from_camera)),
     };
-    engine.push_key(&input).unwrap();
+    engine.push_key(&input).expect("the key is as declared");
 }
 
 #[test]
