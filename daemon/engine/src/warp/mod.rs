@@ -14,8 +14,39 @@ pub mod scatter;
 #[cfg(test)]
 mod laws;
 
+use rayon::ThreadPool;
+
+use crate::bands::for_each_row;
+use crate::color::Texel;
 use crate::key::Velocity;
 use crate::phase::Phase;
+use crate::plane::{Plane, Rect};
+
+/// Calls `inside(row, pixels)` for every row of the valid rectangle of `out`, counted from its top,
+/// and copies what lies outside from `color`.
+fn for_each_valid_row<T: Texel>(
+    pool: &ThreadPool,
+    valid: Rect,
+    color: &Plane<T>,
+    out: &mut Plane<T>,
+    inside: impl Fn(u32, &mut [T]) + Sync,
+) {
+    for_each_row(
+        pool,
+        out,
+        #[inline(always)]
+        |y, row| {
+            if !(valid.y..valid.y + valid.height).contains(&y) {
+                row.copy_from_slice(color.row(y));
+                return;
+            }
+            let (left, right) = (valid.x as usize, (valid.x + valid.width) as usize);
+            row[..left].copy_from_slice(&color.row(y)[..left]);
+            row[right..].copy_from_slice(&color.row(y)[right..]);
+            inside(y - valid.y, &mut row[left..right]);
+        },
+    );
+}
 
 /// Displacement after `phase` of a surface that moves by `velocity` per motion span, Q8 pixels:
 /// `(v p + 256) >> 9` with v in 1/32 pixel and p in Q12. Where no velocity is known, 0.

@@ -2,14 +2,13 @@
 
 use rayon::ThreadPool;
 
-use crate::bands::for_each_row;
 use crate::color::{ColorPlane, Texel};
 use crate::field::FieldMap;
 use crate::key::{KeyFrame, Velocity};
 use crate::phase::Phase;
 use crate::plane::{Plane, Rect};
-use crate::warp::displacement;
 use crate::warp::sample::{Listed, sample_run};
+use crate::warp::{displacement, for_each_valid_row};
 
 /// Warps `key` to `phase` into `out`, which has the key's size and format. `map` is the map of
 /// the key's field grid; the key has a velocity field.
@@ -37,21 +36,15 @@ struct Field<'a> {
 }
 
 fn warp<T: Texel>(pool: &ThreadPool, field: &Field<'_>, color: &Plane<T>, out: &mut Plane<T>) {
-    let valid = field.valid;
-    for_each_row(
+    for_each_valid_row(
         pool,
+        field.valid,
+        color,
         out,
         #[inline(always)]
-        |y, row| {
-            if !(valid.y..valid.y + valid.height).contains(&y) {
-                row.copy_from_slice(color.row(y));
-                return;
-            }
-            let (left, right) = (valid.x as usize, (valid.x + valid.width) as usize);
-            row[..left].copy_from_slice(&color.row(y)[..left]);
-            row[right..].copy_from_slice(&color.row(y)[right..]);
-            for (block, texels) in (0..).zip(row[left..right].chunks_mut(BLOCK)) {
-                gather_block(field, color, [block * BLOCK as u32, y - valid.y], texels);
+        |index_y, row| {
+            for (block, texels) in (0..).zip(row.chunks_mut(BLOCK)) {
+                gather_block(field, color, [block * BLOCK as u32, index_y], texels);
             }
         },
     );

@@ -1,8 +1,7 @@
 //! Where the pixels of a row are read in smooth cells: (1) of [`super`].
 //!
 //! Displacement is interpolated between cell centres, down to the row once per cell and then along
-//! the row once per pixel. The cells of the whole row come first: what was just written in one
-//! width is slow to read in another.
+//! the row once per pixel.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;

@@ -5,12 +5,12 @@ use rayon::ThreadPool;
 use super::LinearScratch;
 use super::between::with_row_cells;
 use super::broken::broken_cell;
-use crate::bands::for_each_row;
 use crate::color::{ColorPlane, Texel};
 use crate::field::FieldMap;
 use crate::key::{KeyFrame, Velocity};
 use crate::phase::Phase;
 use crate::plane::{Plane, Rect};
+use crate::warp::for_each_valid_row;
 use crate::warp::resolve::CellClass;
 use crate::warp::sample::{Positions as _, sample, sample_run};
 
@@ -63,21 +63,13 @@ pub(super) struct Surface {
 }
 
 fn gather<T: Texel>(pool: &ThreadPool, frame: &Frame<'_>, color: &Plane<T>, out: &mut Plane<T>) {
-    let valid = frame.valid;
-    for_each_row(
+    for_each_valid_row(
         pool,
+        frame.valid,
+        color,
         out,
         #[inline(always)]
-        |y, row| {
-            if !(valid.y..valid.y + valid.height).contains(&y) {
-                row.copy_from_slice(color.row(y));
-                return;
-            }
-            let (left, right) = (valid.x as usize, (valid.x + valid.width) as usize);
-            row[..left].copy_from_slice(&color.row(y)[..left]);
-            row[right..].copy_from_slice(&color.row(y)[right..]);
-            gather_row(frame, color, y - valid.y, &mut row[left..right]);
-        },
+        |index_y, row| gather_row(frame, color, index_y, row),
     );
 }
 

@@ -214,27 +214,28 @@ impl Band<'_> {
             (&mut self.top[row * width..][..width], &mut self.splat[row * width..][..width]);
         let depths = &self.source.depth.row(y as u32)[x..];
         let first = (y * width + x) as u32;
-        // Of cell i of the block: on the target column left of where it lands, and right of it.
-        let left = |i: usize| Splat {
-            depth: depths[i],
-            candidate: ((landing.x[i] + side.away(landing.y[i])) >> 2 << SOURCE_BITS)
-                | (first + i as u32),
-            lands: side.is_reached(landing.y[i]),
+        // What a cell brings to the target column left of where it lands, and right of it.
+        let left = |depth: u32, [x, y]: [u32; 2], cell: u32| Splat {
+            depth,
+            candidate: ((x + side.away(y)) >> 2 << SOURCE_BITS) | cell,
+            lands: side.is_reached(y),
         };
-        let right = |i: usize| Splat {
-            depth: depths[i],
-            candidate: ((256 - landing.x[i] + side.away(landing.y[i])) >> 2 << SOURCE_BITS)
-                | (first + i as u32),
-            lands: side.is_reached(landing.y[i]) & (landing.x[i] > 0),
+        let right = |depth: u32, [x, y]: [u32; 2], cell: u32| Splat {
+            depth,
+            candidate: ((256 - x + side.away(y)) >> 2 << SOURCE_BITS) | cell,
+            lands: side.is_reached(y) & (x > 0),
         };
+        let way = |i: usize| [landing.x[i], landing.y[i]];
         let shift = x as isize + landing.right_by[run.start] as isize;
         let column =
             |i: usize| usize::try_from(i as isize + shift).ok().filter(|column| *column < width);
         if let Some(column) = column(run.start) {
-            add(&mut tops[column], &mut splats[column], left(run.start));
+            let i = run.start;
+            add(&mut tops[column], &mut splats[column], left(depths[i], way(i), first + i as u32));
         }
         if let Some(column) = column(run.end) {
-            add(&mut tops[column], &mut splats[column], right(run.end - 1));
+            let i = run.end - 1;
+            add(&mut tops[column], &mut splats[column], right(depths[i], way(i), first + i as u32));
         }
         // Columns between: of cell i from its left, of cell i - 1 from its right.
         let from = (run.start + 1).max(0_usize.saturating_add_signed(-shift));
@@ -251,18 +252,8 @@ impl Band<'_> {
         let sources = depths.zip(ways_x).zip(ways_y);
         let cells = first + from as u32..;
         for (((top, splat), ((depth, x), y)), cell) in columns.zip(sources).zip(cells) {
-            let from_left = Splat {
-                depth: depth[1],
-                candidate: ((x[1] + side.away(y[1])) >> 2 << SOURCE_BITS) | cell,
-                lands: side.is_reached(y[1]),
-            };
-            let from_right = Splat {
-                depth: depth[0],
-                candidate: ((256 - x[0] + side.away(y[0])) >> 2 << SOURCE_BITS) | (cell - 1),
-                lands: side.is_reached(y[0]) & (x[0] > 0),
-            };
-            add(top, splat, from_left);
-            add(top, splat, from_right);
+            add(top, splat, left(depth[1], [x[1], y[1]], cell));
+            add(top, splat, right(depth[0], [x[0], y[0]], cell - 1));
         }
     }
 }
