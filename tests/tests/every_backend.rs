@@ -1,5 +1,7 @@
-//! One scene, one digest: on the CPU with any number of threads, and on every GPU adapter there is.
+//! One scene, one digest: on the CPU with and without its widest registers and with any number of
+//! threads, and on every GPU adapter there is.
 
+use std::fmt;
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 
@@ -7,7 +9,7 @@ use foreframe_engine::backend::gpu::Gpu;
 use foreframe_engine::backend::gpu::test_adapters::test_gpus;
 use foreframe_engine::key::Camera;
 use foreframe_engine::{
-    ColorPlane, Engine, EngineConfig, KeyInput, Method, MonoSpan, MonoTime, PlaneInput, Rect,
+    ColorPlane, Engine, EngineConfig, KeyInput, Method, MonoSpan, MonoTime, PlaneInput, Rect, Simd,
     StreamFormat,
 };
 use foreframe_fixtures::client::{CLIENT_MOTION, stream_options};
@@ -18,6 +20,27 @@ use foreframed::ingest;
 const SIZE: Size = Size { width: 96, height: 54 };
 const INTERVAL: MonoSpan = MonoSpan::from_ms(25);
 const KEYS: u32 = 3;
+
+/// What one digest is made by.
+#[derive(Clone, Copy)]
+enum Way<'a> {
+    /// One thread of the CPU, with no more than every processor of its architecture has.
+    Portable,
+    /// The CPU, with all that it has.
+    Widest { threads: usize },
+    /// A GPU adapter, after decode on the CPU.
+    Gpu(&'a Arc<Gpu>),
+}
+
+impl fmt::Display for Way<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Portable => f.write_str("portable CPU"),
+            Self::Widest { threads } => write!(f, "CPU with {threads} threads"),
+            Self::Gpu(gpu) => f.write_str(gpu.name()),
+        }
+    }
+}
 
 /// The keys of a scene, and what their stream declares.
 struct Rendered {
@@ -39,16 +62,17 @@ impl Rendered {
     }
 
     /// The digest of two frames after each key.
-    fn digest(&self, method: Method, threads: usize, gpu: Option<&Arc<Gpu>>) -> String {
-        let config = EngineConfig {
-            method,
-            threads: NonZeroUsize::new(threads).expect("a positive number"),
-            pixels_per_degree: None,
-            timer: || MonoTime::ZERO,
-            worker_started: || (),
-        };
+    fn digest(&self, method: Method, way: Way<'_>) -> String {
+        let mut config = EngineConfig::new(method, NonZeroUsize::MIN);
+        match way {
+            Way::Portable => config.simd = Simd::Portable,
+            Way::Widest { threads } => {
+                config.threads = NonZeroUsize::new(threads).expect("a positive number");
+            }
+            Way::Gpu(_) => (),
+        }
         let mut engine = Engine::new(self.format, config);
-        if let Some(gpu) = gpu {
+        if let Way::Gpu(gpu) = way {
             engine.use_gpu(gpu);
         }
         let mut digester = FrameDigester::default();
@@ -104,27 +128,36 @@ fn push(engine: &mut Engine, key: &RenderedKey, content_time: MonoTime) {
 #[test]
 fn every_scene_has_one_digest_on_the_cpu_and_on_every_adapter() {
     let gpus = test_gpus("every_scene_has_one_digest_on_the_cpu_and_on_every_adapter");
+    let ways: Vec<_> = [1, 2, 5]
+        .into_iter()
+        .map(|threads| Way::Widest { threads })
+        .chain(gpus.iter().map(Way::Gpu))
+        .collect();
     for scene in SCENES {
         let rendered = Rendered::new(scene);
         for method in Method::ALL {
-            let expected = rendered.digest(method, 1, None);
-            for threads in [2, 5] {
-                let found = rendered.digest(method, threads, None);
-                assert_eq!(found, expected, "{}: {method}, {threads} threads", scene.name);
-            }
-            for gpu in &gpus {
-                let found = rendered.digest(method, 2, Some(gpu));
-                assert_eq!(found, expected, "{}: {method} on {}", scene.name, gpu.name());
+            let expected = rendered.digest(method, Way::Portable);
+            for way in &ways {
+                assert_eq!(
+                    rendered.digest(method, *way),
+                    expected,
+                    "{}: {method}, {way}",
+                    scene.name
+                );
             }
         }
     }
 }
 
 #[test]
-fn one_pixel_of_one_key_makes_another_digest() {
+fn one_pixel_of_one_key_makes_another_digest_on_every_way() {
+    let gpus = test_gpus("one_pixel_of_one_key_makes_another_digest_on_every_way");
     let mut rendered = Rendered::new(&SCENES[0]);
-    let before = rendered.digest(Method::Linear, 1, None);
+    let before = rendered.digest(Method::Linear, Way::Portable);
     let middle = rendered.keys[1].color.rgba.len() / 8 * 4;
     rendered.keys[1].color.rgba[middle] ^= 1;
-    assert_ne!(rendered.digest(Method::Linear, 1, None), before);
+    let cpu = [Way::Portable, Way::Widest { threads: 1 }];
+    for way in cpu.into_iter().chain(gpus.iter().map(Way::Gpu)) {
+        assert_ne!(rendered.digest(Method::Linear, way), before, "{way}");
+    }
 }

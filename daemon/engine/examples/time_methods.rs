@@ -92,13 +92,7 @@ fn time(
         }),
         ..StreamFormat::rgba8(width, height)
     };
-    let config = EngineConfig {
-        method,
-        threads,
-        pixels_per_degree: None,
-        timer: now,
-        worker_started: || (),
-    };
+    let config = EngineConfig { timer: now, ..EngineConfig::new(method, threads) };
     let mut engine = Engine::new(format, config);
     if let Some(gpu) = gpu {
         engine.use_gpu(gpu);

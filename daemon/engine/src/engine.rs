@@ -18,6 +18,7 @@ use crate::format::{DepthMeaning, StreamFormat};
 use crate::key::{KeyFrame, KeyInput};
 use crate::method::Method;
 use crate::phase::Phase;
+use crate::simd::Simd;
 use crate::time::{MonoSpan, MonoTime};
 
 /// What an engine does and with how much of the machine.
@@ -30,10 +31,28 @@ pub struct EngineConfig {
     /// Pixels per degree of visual angle. Turns on the damping of motion that no eye can follow;
     /// None leaves motion as it is.
     pub pixels_per_degree: Option<f32>,
+    /// Which ways through the kernels are taken. The result does not depend on it.
+    pub simd: Simd,
     /// Runs on each worker thread when it starts, for a priority that the engine knows nothing of.
     pub worker_started: fn(),
     /// Reads the clock that the times in reports come from. A constant in deterministic replay.
     pub timer: fn() -> MonoTime,
+}
+
+impl EngineConfig {
+    /// Makes frames by `method` on `threads`: undamped, by the widest registers, without asking for
+    /// priority, and with a timer that stands still.
+    #[must_use]
+    pub fn new(method: Method, threads: NonZeroUsize) -> Self {
+        Self {
+            method,
+            threads,
+            pixels_per_degree: None,
+            simd: Simd::Widest,
+            worker_started: || (),
+            timer: || MonoTime::ZERO,
+        }
+    }
 }
 
 /// What taking in a key frame led to.
@@ -100,7 +119,7 @@ impl Engine {
         Self {
             format,
             config,
-            pool: Arc::new(start_pool(config.threads.get(), config.worker_started)),
+            pool: Arc::new(start_pool(config.threads, config.simd, config.worker_started)),
             newest: None,
             previous: None,
             spare: KeyFrame::default(),
@@ -218,14 +237,19 @@ impl Engine {
     }
 }
 
-/// A pool of `threads`, or of as many as the system starts.
-fn start_pool(threads: usize, started: fn()) -> ThreadPool {
-    (1..=threads)
+/// A pool of `threads`, or of as many as the system starts, which go through kernels as `simd`
+/// says.
+pub(crate) fn start_pool(threads: NonZeroUsize, simd: Simd, started: fn()) -> ThreadPool {
+    (1..=threads.get())
         .rev()
         .find_map(|threads| {
             let name = |index| format!("foreframe-{index}");
             let pool = ThreadPoolBuilder::new().num_threads(threads).thread_name(name);
-            pool.start_handler(move |_| started()).build().ok()
+            let start = move |_| {
+                simd.enter();
+                started();
+            };
+            pool.start_handler(start).build().ok()
         })
         .expect("a system that runs this thread can start one more")
 }

@@ -26,7 +26,7 @@ pub mod pacing;
 pub mod params;
 pub mod phase;
 pub mod plane;
-mod simd;
+pub mod simd;
 #[cfg(test)]
 mod testing;
 pub mod time;
@@ -41,4 +41,5 @@ pub use key::{Camera, KeyFrame, KeyInput, PlaneInput};
 pub use method::Method;
 pub use phase::Phase;
 pub use plane::{Plane, Rect};
+pub use simd::Simd;
 pub use time::{MonoSpan, MonoTime};

@@ -99,11 +99,10 @@ impl Server {
             create: *create,
             core: CoreConfig {
                 engine: EngineConfig {
-                    method: config.method,
-                    threads: config.threads,
                     pixels_per_degree: config.pixels_per_degree,
                     timer: clock::now,
                     worker_started: thread::ask_for_real_time_work,
+                    ..EngineConfig::new(config.method, config.threads)
                 },
                 refresh_interval: config.refresh_interval,
                 display_origin: self.display_origin,

@@ -37,13 +37,7 @@ pub(super) fn time_case(
     settings: &Settings,
     copy: &mut PlainCopy,
 ) -> anyhow::Result<Times> {
-    let config = EngineConfig {
-        method,
-        threads: settings.threads,
-        pixels_per_degree: None,
-        worker_started: || (),
-        timer: || MonoTime::from_ns(0),
-    };
+    let config = EngineConfig::new(method, settings.threads);
     let mut engine = Engine::new(rendered.format, config);
     if let Some(gpu) = &backend.gpu {
         engine.use_gpu(gpu);

@@ -117,14 +117,9 @@ fn count_motion(plan: &Plan) -> MotionCounts {
 }
 
 fn engine_of(method: Method, format: StreamFormat, options: &ScoreOptions) -> Engine {
-    let config = EngineConfig {
-        method,
-        threads: options.threads,
-        // Damping is for eyes, and the metrics have none.
-        pixels_per_degree: None,
-        timer: options.timer,
-        worker_started: || (),
-    };
+    // Not damped: damping is for eyes, and the metrics have none.
+    let config =
+        EngineConfig { timer: options.timer, ..EngineConfig::new(method, options.threads) };
     let mut engine = Engine::new(format, config);
     if let Some(gpu) = &options.gpu {
         engine.use_gpu(gpu);

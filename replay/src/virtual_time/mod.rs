@@ -161,11 +161,8 @@ impl VirtualStream {
             format,
             &CoreConfig {
                 engine: EngineConfig {
-                    method: config.method,
-                    threads: config.threads,
                     pixels_per_degree: config.pixels_per_degree,
-                    timer: || MonoTime::ZERO,
-                    worker_started: || (),
+                    ..EngineConfig::new(config.method, config.threads)
                 },
                 refresh_interval,
                 display_origin: origin,

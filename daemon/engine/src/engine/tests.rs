@@ -21,15 +21,7 @@ fn format() -> StreamFormat {
 }
 
 fn engine(method: Method) -> Engine {
-    let threads = NonZeroUsize::MIN;
-    let config = EngineConfig {
-        method,
-        threads,
-        pixels_per_degree: None,
-        timer: || MonoTime::ZERO,
-        worker_started: || (),
-    };
-    Engine::new(format(), config)
+    Engine::new(format(), EngineConfig::new(method, NonZeroUsize::MIN))
 }
 
 /// Pushes a key whose pixel (x, y) is `seed + 16 * y + x` in each channel, moving 3 pixels right

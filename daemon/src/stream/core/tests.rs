@@ -51,13 +51,7 @@ impl Rig {
             ..StreamFormat::rgba8(SIZE, SIZE)
         };
         let config = CoreConfig {
-            engine: EngineConfig {
-                method,
-                threads: NonZeroUsize::MIN,
-                pixels_per_degree: None,
-                timer: tick,
-                worker_started: || (),
-            },
+            engine: EngineConfig { timer: tick, ..EngineConfig::new(method, NonZeroUsize::MIN) },
             refresh_interval: INTERVAL,
             display_origin: MonoTime::ZERO,
         };
