@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use crate::commands::{
     adapters, bench, completions, demo, export, import, info, man, pacing, perception, replay,
-    scenes, score, serve,
+    scenes, score, serve, stability,
 };
 use crate::output::Output;
 use foreframed::UsageError;
@@ -43,6 +43,8 @@ pub enum Command {
     Replay(replay::Args),
     /// Predict left-out frames of captures and measure how far off the methods are.
     Score(score::Args),
+    /// Find out where methods fail: one knob at a time, on scenes that isolate one difficulty.
+    Stability(stability::Args),
     /// Time the engine on built-in scenes, beside plain copies of the same bytes.
     Bench(bench::Args),
     /// List the GPU adapters, and say which one would be chosen.
@@ -90,6 +92,7 @@ impl Cli {
             Command::Info(args) => info::run(&args, &output),
             Command::Replay(args) => replay::run(&args, &output),
             Command::Score(args) => score::run(&args, &output),
+            Command::Stability(args) => stability::run(&args, &output),
             Command::Bench(args) => bench::run(&args, &output),
             Command::Adapters(args) => adapters::run(&args, &output),
             Command::Pacing(args) => pacing::run(&args, &output),

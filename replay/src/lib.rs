@@ -15,4 +15,5 @@ pub mod output;
 pub mod pictures;
 pub mod recording;
 pub mod score;
+pub mod stability;
 pub mod virtual_time;

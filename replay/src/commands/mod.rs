@@ -14,3 +14,4 @@ pub mod replay;
 pub mod scenes;
 pub mod score;
 pub mod serve;
+pub mod stability;
