@@ -7,8 +7,8 @@
 use foreframe_engine::Method;
 
 use super::report::{Case, Report};
-use crate::draw::palette::{GRID, INK, MUTED, PANEL, Rgb};
-use crate::draw::{Anchor, Drawing, TextStyle};
+use crate::draw::palette::{GRID, HUES, INK, MUTED, PANEL, Rgb};
+use crate::draw::{Anchor, Drawing, LogAxis, TextStyle};
 
 /// Side of the page, px.
 const PAGE: [u32; 2] = [1680, 800];
@@ -23,16 +23,6 @@ const LABEL: TextStyle = TextStyle { size: 18.0, color: INK, anchor: Anchor::Sta
 const TICK: TextStyle = TextStyle { size: 15.0, color: MUTED, anchor: Anchor::Middle };
 /// The plain copy, which all others are read against.
 const COPY: Rgb = INK;
-/// Okabe and Ito (2008): hues that stay apart for readers who do not tell red from green.
-const HUES: [Rgb; 7] = [
-    [0, 114, 178],
-    [213, 94, 0],
-    [0, 158, 115],
-    [204, 121, 167],
-    [230, 159, 0],
-    [86, 180, 233],
-    [120, 94, 60],
-];
 /// Dashes of the backends, px: none for the first.
 const DASHES: [Option<f32>; 4] = [None, Some(8.0), Some(3.0), Some(14.0)];
 
@@ -189,48 +179,6 @@ fn draw_legend(drawing: &mut Drawing, series: &[Series]) {
     }
 }
 
-/// A logarithmic axis from positive values to pixels, which may run backwards.
-#[derive(Clone, Copy, PartialEq, Debug)]
-struct LogAxis {
-    low: f64,
-    high: f64,
-    from: f32,
-    to: f32,
-}
-
-impl LogAxis {
-    /// An axis that holds all `values`, which are finite and positive, with a little room on each
-    /// side. None without values.
-    fn over(values: impl Iterator<Item = f64>, [from, to]: [f32; 2]) -> Option<Self> {
-        let (low, high) = values.fold(None, |range: Option<(f64, f64)>, value| {
-            let log = libm::log10(value);
-            Some(range.map_or((log, log), |(low, high)| (low.min(log), high.max(log))))
-        })?;
-        let room = ((high - low) * 0.04).max(0.05);
-        Some(Self { low: low - room, high: high + room, from, to })
-    }
-
-    /// Pixel of `value`.
-    fn at(&self, value: f64) -> f32 {
-        let way = (libm::log10(value) - self.low) / (self.high - self.low);
-        self.from + (self.to - self.from) * way as f32
-    }
-
-    /// 1, 2 and 5 times powers of ten, with their labels.
-    fn ticks(&self) -> impl Iterator<Item = (f64, String)> + use<> {
-        let Self { low, high, .. } = *self;
-        let decades = low.floor() as i32..=high.ceil() as i32;
-        let values = decades.flat_map(|decade| {
-            [1.0, 2.0, 5.0].map(|factor| (factor * libm::pow(10.0, f64::from(decade)), decade))
-        });
-        let inside = values.filter(move |(value, _)| (low..=high).contains(&libm::log10(*value)));
-        inside.map(|(value, decade)| {
-            let decimals = usize::try_from(-decade).unwrap_or(0);
-            (value, format!("{value:.decimals$}"))
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use foreframe_fixtures::Size;
@@ -309,20 +257,6 @@ mod tests {
             assert!(PLOTS.into_iter().any(is_inside), "{points:?}");
         }
         assert_eq!(lines.len() - plotted.len(), 7, "the samples of the legend");
-    }
-
-    #[test]
-    fn what_takes_longer_is_higher_and_ten_times_longer_always_by_as_much() {
-        let axis = LogAxis::over([0.01, 250.0].into_iter(), [600.0, 100.0]).unwrap();
-        let rise = |from: f64| axis.at(from) - axis.at(10.0 * from);
-        assert!(rise(0.1) > 1.0);
-        assert!((rise(0.1) - rise(7.0)).abs() < 1e-3);
-        let labels: Vec<_> = axis.ticks().map(|(_, label)| label).collect();
-        let expected = [
-            "0.01", "0.02", "0.05", "0.1", "0.2", "0.5", "1", "2", "5", "10", "20", "50", "100",
-            "200",
-        ];
-        assert_eq!(labels, expected);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use tiny_skia::Pixmap;
 
-use super::palette::{PAGE, Rgb};
+use super::palette::{GRID, INK, MUTED, PAGE, PANEL, Rgb};
 use super::{Anchor, Canvas, TextStyle};
 
 #[derive(Clone, PartialEq, Debug)]
@@ -72,13 +72,15 @@ impl Drawing {
         Some(canvas.into_pixmap())
     }
 
-    /// The page as a complete SVG file. Text is in the reader's own sans-serif font.
+    /// The page as a complete SVG file. Text is in the reader's own sans-serif font, and page, ink
+    /// and grid are dark where the reader prefers a dark page.
     #[must_use]
     pub fn to_svg(&self) -> String {
         let [width, height] = self.size;
         let mut svg = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" font-family=\"Ubuntu, sans-serif\">\n"
         );
+        svg += &dark_style();
         let page = Shape::Box { at: [0.0; 2], size: [width as f32, height as f32], color: PAGE };
         for shape in std::iter::once(&page).chain(&self.shapes) {
             write_shape(&mut svg, shape).expect("a string takes any text");
@@ -125,6 +127,24 @@ fn write_shape(svg: &mut String, shape: &Shape) -> std::fmt::Result {
             )
         }
     }
+}
+
+/// What page, panel, ink, muted ink and grid become on a dark page.
+const DARK: [(Rgb, Rgb); 5] = [
+    (PAGE, [22, 24, 28]),
+    (PANEL, [32, 35, 40]),
+    (INK, [232, 232, 226]),
+    (MUTED, [160, 163, 170]),
+    (GRID, [58, 62, 70]),
+];
+
+/// Rules that win over the attributes of shapes in a dark theme.
+fn dark_style() -> String {
+    let rules = DARK.map(|(light, dark)| {
+        let (light, dark) = (hex(light), hex(dark));
+        format!("[fill=\"{light}\"]{{fill:{dark}}}[stroke=\"{light}\"]{{stroke:{dark}}}")
+    });
+    format!("<style>@media (prefers-color-scheme:dark){{{}}}</style>\n", rules.concat())
 }
 
 fn hex([red, green, blue]: Rgb) -> String {
@@ -176,6 +196,16 @@ mod tests {
         );
         assert!(svg.contains("text-anchor=\"end\">a &lt; b &amp; c</text>"), "{svg}");
         assert!(svg.starts_with("<svg xmlns") && svg.ends_with("</svg>\n"), "{svg}");
+    }
+
+    #[test]
+    fn on_a_dark_page_ink_is_light_and_hues_stay() {
+        let mut drawing = drawing();
+        drawing.fill_box([0.0; 2], [1.0; 2], INK);
+        let svg = drawing.to_svg();
+        assert!(svg.contains("[fill=\"#222428\"]{fill:#e8e8e2}"), "{svg}");
+        assert!(svg.contains("fill=\"#222428\"/>"), "the light page is in the attributes");
+        assert!(!svg.contains("[fill=\"#ff0000\"]"), "a hue has no rule");
     }
 
     #[test]

@@ -5,11 +5,13 @@
 //! Positions are pixels from the top left corner; nothing outside the canvas is drawn, and nothing
 //! fails: what does not fit is clipped.
 
+mod axis;
 mod canvas;
 mod drawing;
 pub mod palette;
 mod text;
 
+pub use axis::{LinearAxis, LogAxis};
 pub use canvas::Canvas;
 pub use drawing::Drawing;
 pub use text::{Anchor, TextStyle, text_width};

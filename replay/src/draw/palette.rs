@@ -26,6 +26,17 @@ pub const SYNTHESISED: Rgb = [86, 180, 233];
 pub const REPEATED: Rgb = [230, 159, 0];
 /// Frames that were not shown.
 pub const DROPPED: Rgb = [204, 51, 17];
+/// Colours of series, after Okabe and Ito (2008): hues that stay apart for readers who do not tell
+/// red from green, on a light page and on a dark one.
+pub const HUES: [Rgb; 7] = [
+    [0, 114, 178],
+    [213, 94, 0],
+    [0, 158, 115],
+    [204, 121, 167],
+    [230, 159, 0],
+    [86, 180, 233],
+    [120, 94, 60],
+];
 
 /// Opaque colour for tiny-skia.
 #[must_use]

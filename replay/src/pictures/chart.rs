@@ -3,8 +3,8 @@
 //! A chart is a [`Drawing`], so that the same shapes become PNG or SVG.
 
 use super::PictureError;
-use crate::draw::palette::{GRID, INK, MUTED, PANEL, Rgb};
-use crate::draw::{Anchor, Drawing, TextStyle, text_width};
+use crate::draw::palette::{GRID, HUES, INK, MUTED, PANEL, Rgb};
+use crate::draw::{Anchor, Drawing, LinearAxis, TextStyle, text_width};
 
 const WIDTH: u32 = 960;
 const HEIGHT: u32 = 600;
@@ -13,17 +13,8 @@ const ACROSS: [f32; 2] = [84.0, 760.0];
 const DOWN: [f32; 2] = [64.0, 530.0];
 const LABEL: TextStyle = TextStyle { size: 15.0, color: INK, anchor: Anchor::Start };
 const TICK: TextStyle = TextStyle { size: 13.0, color: MUTED, anchor: Anchor::Middle };
-/// Colours of lines, apart for readers who do not tell red from green; beyond them they repeat,
-/// dashed.
-const COLORS: [Rgb; 7] = [
-    [0, 114, 178],
-    [213, 94, 0],
-    [0, 158, 115],
-    [204, 121, 167],
-    [86, 180, 233],
-    [230, 159, 0],
-    [34, 36, 40],
-];
+/// Most ticks of an axis, less one.
+const TICKS: u32 = 10;
 
 /// What a chart says in words.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -53,13 +44,13 @@ pub fn line_chart(labels: ChartLabels<'_>, series: &[Series]) -> Result<Drawing,
     let is_finite = |point: &&[f64; 2]| point.iter().all(|number| number.is_finite());
     let points = || series.iter().flat_map(|series| &series.points).filter(is_finite);
     let empty = PictureError::Empty { expected: "point with finite numbers" };
-    let across = Scale::over(points().map(|point| point[0]), ACROSS).ok_or(empty.clone())?;
-    let up = Scale::over(points().map(|point| point[1]), [DOWN[1], DOWN[0]]).ok_or(empty)?;
+    let across = LinearAxis::over(points().map(|point| point[0]), ACROSS).ok_or(empty.clone())?;
+    let up = LinearAxis::over(points().map(|point| point[1]), [DOWN[1], DOWN[0]]).ok_or(empty)?;
     let mut drawing = Drawing::new([WIDTH, HEIGHT]);
     draw_frame(&mut drawing, labels, &across, &up, true);
     for (index, series) in series.iter().enumerate() {
-        let color = COLORS[index % COLORS.len()];
-        let dash = (index >= COLORS.len()).then_some(6.0);
+        let color = HUES[index % HUES.len()];
+        let dash = (index >= HUES.len()).then_some(6.0);
         let points: Vec<_> = series
             .points
             .iter()
@@ -94,8 +85,8 @@ pub fn map_chart(
     value: impl Fn(f64, f64) -> f64,
     outline: &[[f64; 2]],
 ) -> Drawing {
-    let across = Scale::new(axes.across, ACROSS);
-    let up = Scale::new(axes.up, [DOWN[1], DOWN[0]]);
+    let across = LinearAxis::new(axes.across, ACROSS);
+    let up = LinearAxis::new(axes.up, [DOWN[1], DOWN[0]]);
     let mut drawing = Drawing::new([WIDTH, HEIGHT]);
     draw_frame(&mut drawing, labels, &across, &up, false);
     let middle = |[from, to]: [f64; 2], index: u16, count: u16| {
@@ -137,8 +128,8 @@ pub fn map_chart(
 fn draw_frame(
     drawing: &mut Drawing,
     labels: ChartLabels<'_>,
-    across: &Scale,
-    up: &Scale,
+    across: &LinearAxis,
+    up: &LinearAxis,
     has_grid: bool,
 ) {
     let size = [ACROSS[1] - ACROSS[0], DOWN[1] - DOWN[0]];
@@ -147,7 +138,7 @@ fn draw_frame(
     drawing.text(labels.up, [ACROSS[0] - 60.0, DOWN[0] - 10.0], LABEL);
     let middle = f32::midpoint(ACROSS[0], ACROSS[1]) - text_width(labels.across, LABEL.size) / 2.0;
     drawing.text(labels.across, [middle, DOWN[1] + 52.0], LABEL);
-    for (value, text) in across.ticks() {
+    for (value, text) in across.ticks(TICKS) {
         let x = across.at(value);
         if has_grid {
             drawing.fill_box([x - 0.5, DOWN[0]], [1.0, size[1]], GRID);
@@ -155,7 +146,7 @@ fn draw_frame(
         drawing.fill_box([x - 0.5, DOWN[1]], [1.0, 6.0], MUTED);
         drawing.text(&text, [x, DOWN[1] + 22.0], TICK);
     }
-    for (value, text) in up.ticks() {
+    for (value, text) in up.ticks(TICKS) {
         let y = up.at(value);
         if has_grid {
             drawing.fill_box([ACROSS[0], y - 0.5], [size[0], 1.0], GRID);
@@ -179,53 +170,8 @@ fn glow(value: f64) -> Rgb {
     })
 }
 
-/// Numbers to pixels, with round ticks.
-#[derive(Clone, Copy, PartialEq, Debug)]
-struct Scale {
-    range: [f64; 2],
-    pixels: [f32; 2],
-}
-
-impl Scale {
-    fn new(range: [f64; 2], pixels: [f32; 2]) -> Self {
-        Self { range, pixels }
-    }
-
-    /// A scale that holds all `values`, which are finite. None without values.
-    fn over(values: impl Iterator<Item = f64>, pixels: [f32; 2]) -> Option<Self> {
-        let (low, high) = values.fold(None, |range: Option<(f64, f64)>, value| {
-            Some(range.map_or((value, value), |(low, high)| (low.min(value), high.max(value))))
-        })?;
-        let room = if high > low { (high - low) * 0.03 } else { low.abs().max(1.0) * 0.5 };
-        Some(Self::new([low - room, high + room], pixels))
-    }
-
-    fn at(&self, value: f64) -> f32 {
-        let way = (value - self.range[0]) / (self.range[1] - self.range[0]);
-        self.pixels[0] + (self.pixels[1] - self.pixels[0]) * way as f32
-    }
-
-    /// Round values inside, at most 11, with their labels.
-    fn ticks(&self) -> impl Iterator<Item = (f64, String)> + use<> {
-        let least = (self.range[1] - self.range[0]) / 10.0;
-        let decade = 10_f64.powf(least.log10().floor());
-        let factor = [1.0, 2.0, 5.0, 10.0].into_iter().find(|factor| factor * decade >= least);
-        let step = factor.unwrap_or(10.0) * decade;
-        let decimals = (-step.log10().floor()).max(0.0) as usize;
-        let (first, last) = ((self.range[0] / step).ceil(), (self.range[1] / step).floor());
-        let count = (last - first).clamp(0.0, 10.0) as u32;
-        (0..=count).map(move |index| {
-            // Adding 0 turns a negative zero into one without a sign.
-            let value = (first + f64::from(index)) * step + 0.0;
-            (value, format!("{value:.decimals$}"))
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use proptest::prelude::*;
-
     use super::*;
 
     const LABELS: ChartLabels<'_> = ChartLabels { title: "t", across: "x", up: "y" };
@@ -239,7 +185,7 @@ mod tests {
         let line = |x: u32| {
             (0..HEIGHT).find(|&y| {
                 let pixel = picture.pixel(x, y).unwrap();
-                [pixel.red(), pixel.green(), pixel.blue()] == COLORS[0]
+                [pixel.red(), pixel.green(), pixel.blue()] == HUES[0]
             })
         };
         let rows: Vec<u32> = (left..right).filter_map(line).collect();
@@ -260,15 +206,5 @@ mod tests {
             (at(ACROSS[0] + 40.0, DOWN[1] - 9.0), at(ACROSS[1] - 40.0, DOWN[0] + 9.0));
         assert!(low < 40 && high > 80, "{low} {high}");
         assert_eq!(glow(f64::NAN), glow(0.0));
-    }
-
-    proptest! {
-        #[test]
-        fn ticks_lie_inside_and_are_few(low in -1e6..1e6_f64, span in 1e-3..1e6_f64) {
-            let scale = Scale::over([low, low + span].into_iter(), [0.0, 100.0]).unwrap();
-            let ticks: Vec<f64> = scale.ticks().map(|(value, _)| value).collect();
-            prop_assert!((2..=11).contains(&ticks.len()), "{ticks:?}");
-            prop_assert!(ticks.iter().all(|&value| (-0.1..=100.1).contains(&scale.at(value))));
-        }
     }
 }
