@@ -3,6 +3,8 @@
 //! Points are independent of each other and run side by side; one engine of one thread serves one
 //! method on one point, so that no result depends on how many there are.
 
+use std::num::NonZeroUsize;
+
 use foreframe_engine::{ColorPlane, Engine, EngineConfig, Method, MonoTime, Plane};
 use foreframe_fixtures::probes::{PICTURE, Probe};
 use foreframed::sink::srgb::SrgbConverter;
@@ -165,13 +167,7 @@ fn outputs_of(case: &Case, probe: &Probe, shots: &[KeyShot], dropped: &[usize]) 
 }
 
 fn make(method: Method, sequence: &Sequence, case: &Case) -> anyhow::Result<Made> {
-    let config = EngineConfig {
-        method,
-        threads: std::num::NonZeroUsize::MIN,
-        pixels_per_degree: None,
-        worker_started: || (),
-        timer: || MonoTime::ZERO,
-    };
+    let config = EngineConfig::new(method, NonZeroUsize::MIN);
     let mut engine = Engine::new(stream_format(), config);
     let converter = SrgbConverter::new(&stream_format());
     let key_error = ErrorPicture::of_key(PICTURE.width, PICTURE.height);
