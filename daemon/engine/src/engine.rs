@@ -20,6 +20,7 @@ use crate::method::Method;
 use crate::phase::Phase;
 use crate::simd::Simd;
 use crate::time::{MonoSpan, MonoTime};
+use crate::trajectory::ladder::Ladder;
 
 /// What an engine does and with how much of the machine.
 #[derive(Clone, Copy, Debug)]
@@ -102,6 +103,8 @@ pub struct Engine {
     /// A key frame that is no longer needed, whose buffers the next one takes over.
     spare: KeyFrame,
     scratch: Scratch,
+    /// Of methods whose trajectories are more than the motion field.
+    ladder: Option<Ladder>,
     backend: Backend,
 }
 
@@ -124,6 +127,7 @@ impl Engine {
             previous: None,
             spare: KeyFrame::default(),
             scratch: Scratch::default(),
+            ladder: Ladder::new(config.method, config.pixels_per_degree),
             backend: Backend::default(),
         }
     }
@@ -131,7 +135,7 @@ impl Engine {
     /// Makes pictures on `gpu` instead of the CPU, as long as it works. To be called before the
     /// first key. [`Engine::backend`] says how it went.
     pub fn use_gpu(&mut self, gpu: &Arc<Gpu>) {
-        self.backend.use_gpu(gpu, self.format.color, self.config.method);
+        self.backend.use_gpu(gpu, self.format.color, self.config.method.warp());
     }
 
     /// What makes the pictures, and why it is not what was asked for.
@@ -173,18 +177,25 @@ impl Engine {
             &mut self.scratch.decode,
             &mut self.spare,
         )?;
-        let key = std::mem::take(&mut self.spare);
+        let mut key = std::mem::take(&mut self.spare);
         let motion = match key.motion_from {
             _ if key.is_cut => MotionState::Cut,
             Some(_) => MotionState::Usable,
             None if noticed.lacks_camera_motion => MotionState::LacksCamera,
             None => MotionState::Missing,
         };
+        if let Some(ladder) = &mut self.ladder {
+            if key.motion_from.is_some() {
+                self.scratch.decode.hand_displacement(&mut key);
+            }
+            let older = self.newest.as_ref().filter(|_| !key.is_cut);
+            ladder.take_key(&self.pool, &mut key, older);
+        }
         if !key.velocity.data().is_empty() {
             let cells = [key.velocity.width(), key.velocity.height()];
             self.scratch.map.update(key.valid, cells, key.field_offset);
         }
-        self.backend.take_key(&self.pool, self.config.method, &key, &self.scratch.map);
+        self.backend.take_key(&self.pool, self.config.method.warp(), &key, &self.scratch.map);
         let newest = self.newest.replace(key);
         let dropped = std::mem::replace(&mut self.previous, newest);
         self.spare = dropped.unwrap_or_default();
@@ -228,7 +239,7 @@ impl Engine {
         if let Some(shown) = shown {
             out.copy_from(&shown.color);
         } else {
-            let method = self.config.method;
+            let method = self.config.method.warp();
             let map = &self.scratch.map;
             let frame = FrameInput { method, phase, newest: key, previous, map };
             self.backend.make(&self.pool, &frame, out);

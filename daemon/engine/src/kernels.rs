@@ -6,6 +6,7 @@
 
 use crate::backend::shader::Shader;
 use crate::fill::far_side::FAR_SIDE;
+use crate::trajectory::effective::EFFECTIVE;
 use crate::warp::blend::BLEND;
 use crate::warp::gather::GATHER;
 use crate::warp::grid::GRID;
@@ -43,6 +44,7 @@ pub const KERNELS: &[Kernel] = &[
     exact("warp/blend", "blend", Some(&BLEND)),
     exact("warp/gather", "warp_gather", Some(&GATHER)),
     exact("warp/scatter", "update", Some(&SOURCE)),
+    exact("trajectory/effective", "effective_velocity", Some(&EFFECTIVE)),
     exact("warp/scatter", "scatter", Some(&SCATTER)),
     exact("warp/resolve", "resolve", Some(&RESOLVE)),
     exact("fill/far_side", "far_side", Some(&FAR_SIDE)),

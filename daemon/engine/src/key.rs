@@ -81,9 +81,20 @@ impl Velocity {
     }
 }
 
+/// Acceleration of one surface point, in 1/32 pixel of the colour plane per motion span squared:
+/// after phase p it has moved by v p + a p^2 / 2.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, IntoBytes, Immutable)]
+#[repr(C)]
+pub struct Acceleration {
+    /// To the right.
+    pub x: i16,
+    /// Down.
+    pub y: i16,
+}
+
 /// A key frame in the one convention of the engine.
 ///
-/// `depth` and `velocity`, where present, have the same size: the field grid. Its cells share
+/// All planes of the field that are present have the same size: the field grid. Its cells share
 /// `valid` out evenly; [`crate::field::FieldMap`] is the one definition of where a cell lies.
 #[derive(Clone, Debug, Default)]
 pub struct KeyFrame {
@@ -101,13 +112,23 @@ pub struct KeyFrame {
     pub valid: Rect,
     /// Depth key per cell of the field grid, larger is nearer. Empty without a depth plane.
     pub depth: Plane<u32>,
+    /// 1 / distance along the view axis of a depth key of 1, where that is known.
+    pub inverse_distance_per_depth_key: Option<f32>,
     /// Dilated, quantised motion per cell of the field grid. Empty without a motion plane.
     pub velocity: Plane<Velocity>,
+    /// Acceleration that goes with `velocity`. Empty where nothing accelerates.
+    pub acceleration: Plane<Acceleration>,
+    /// Motion per cell as decoded, neither dilated nor rounded: newer minus older position, pixels
+    /// of the colour plane, NaN where unknown. Kept by methods whose trajectories are worked out
+    /// from it; empty otherwise.
+    pub displacement: Plane<[f32; 2]>,
     /// Jitter of the field against the colour, Q8 pixels of the colour plane: how far right and
     /// down of its even place each cell lies. 0 without jitter.
     pub field_offset: [i32; 2],
     /// Camera at `content_time`.
     pub camera: Option<Camera>,
+    /// Camera at the content time that the motion plane points back to.
+    pub motion_from_camera: Option<Camera>,
 }
 
 impl KeyFrame {

@@ -17,11 +17,29 @@ pub enum Method {
     /// Scatter of depth and source offset along the motion field, then a gather of colour.
     #[default]
     Linear,
+    /// As `linear`, along one homography for the whole image.
+    Global,
+    /// As `linear`, along the local affine map of the motion field, continued as its own power.
+    Affine,
+    /// As `linear`, along velocity and acceleration from the last two motion fields.
+    Quadratic,
+    /// As `linear`, seen by a camera that goes on along its own path; needs depth and cameras.
+    World,
 }
 
 impl Method {
     /// Every method, in the order in which tables list them.
-    pub const ALL: [Self; 5] = [Self::Hold, Self::Blend, Self::Gather, Self::Grid, Self::Linear];
+    pub const ALL: [Self; 9] = [
+        Self::Hold,
+        Self::Blend,
+        Self::Gather,
+        Self::Grid,
+        Self::Linear,
+        Self::Global,
+        Self::Affine,
+        Self::Quadratic,
+        Self::World,
+    ];
 
     /// Name on the command line, in reports and in JSON.
     #[must_use]
@@ -32,6 +50,20 @@ impl Method {
             Self::Gather => "gather",
             Self::Grid => "grid",
             Self::Linear => "linear",
+            Self::Global => "global",
+            Self::Affine => "affine",
+            Self::Quadratic => "quadratic",
+            Self::World => "world",
+        }
+    }
+
+    /// The method whose warp makes its frames: the rungs of the ladder differ in the trajectories
+    /// that they give a key, and share the warp of `linear`.
+    #[must_use]
+    pub const fn warp(self) -> Self {
+        match self {
+            Self::Hold | Self::Blend | Self::Gather | Self::Grid | Self::Linear => self,
+            Self::Global | Self::Affine | Self::Quadratic | Self::World => Self::Linear,
         }
     }
 
@@ -50,7 +82,7 @@ impl fmt::Display for Method {
 
 /// A method name that does not exist.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[error("expected one of hold, blend, gather, grid, linear, found `{found}`")]
+#[error("expected one of {}, found `{found}`", Method::ALL.map(Method::name).join(", "))]
 pub struct UnknownMethod {
     /// What was asked for.
     pub found: String,

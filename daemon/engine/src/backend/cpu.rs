@@ -4,8 +4,10 @@ use rayon::ThreadPool;
 
 use super::FrameInput;
 use crate::color::ColorPlane;
-use crate::key::KeyFrame;
+use crate::key::{KeyFrame, Velocity};
 use crate::method::Method;
+use crate::plane::Plane;
+use crate::trajectory::effective::effective_velocity;
 use crate::warp::blend::blend;
 use crate::warp::gather::warp_gather;
 use crate::warp::grid::{GridScratch, warp_grid};
@@ -16,6 +18,7 @@ use crate::warp::linear::{LinearScratch, warp_linear};
 pub struct CpuBackend {
     grid: GridScratch,
     linear: LinearScratch,
+    effective: Plane<Velocity>,
 }
 
 impl CpuBackend {
@@ -35,10 +38,15 @@ impl CpuBackend {
             (Method::Gather, _) => warp_gather(pool, key, map, phase, out),
             (Method::Grid, _) => warp_grid(key, phase, out, &mut self.grid, pool),
             (Method::Linear, _) => {
+                if !key.acceleration.data().is_empty() {
+                    let (velocity, acceleration) = (&key.velocity, &key.acceleration);
+                    effective_velocity(pool, velocity, acceleration, phase, &mut self.effective);
+                    self.linear.take_velocity(pool, &self.effective);
+                }
                 // A phase other than 0 needs motion, and with motion `linear` has taken the key.
                 warp_linear(pool, key, map, phase, &mut self.linear, out);
             }
-            (Method::Hold, _) | (Method::Blend, None) => out.copy_from(&key.color),
+            _ => out.copy_from(&key.color),
         }
     }
 }

@@ -77,6 +77,8 @@ pub enum Slot {
     Older,
     /// Velocity of the newest key.
     Velocity,
+    /// Acceleration of the newest key.
+    Acceleration,
     /// Depth key of the newest key.
     Depth,
     /// Where cells lie: [`crate::params::map_words`].

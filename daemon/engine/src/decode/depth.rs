@@ -49,6 +49,20 @@ impl DepthToKey {
         }
     }
 
+    /// 1 / distance along the view axis of a key of 1; None for a buffer whose projection is not
+    /// known.
+    #[expect(clippy::cast_possible_truncation, reason = "24 bits of distance are enough")]
+    pub(super) fn inverse_distance_per_key(
+        self,
+        projection: Option<ProjectionDepth>,
+    ) -> Option<f32> {
+        let of_nearest = match self {
+            Self::Linear { near } => Some(1.0 / near),
+            Self::Buffer { .. } => projection.map(|projection| projection.inverse_near()),
+        };
+        of_nearest.map(|inverse| (inverse / f64::from(u32::MAX)) as f32)
+    }
+
     /// The key of a stored value.
     #[inline(always)]
     pub(super) fn key(self, stored: f64) -> u32 {

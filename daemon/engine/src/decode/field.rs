@@ -156,6 +156,13 @@ impl<'a> FieldInput<'a> {
         contradiction
     }
 
+    /// 1 / distance along the view axis of a depth key of 1, where that is known.
+    pub(super) fn inverse_distance_per_depth_key(&self) -> Option<f32> {
+        let convention = self.depth.and(self.format.depth)?;
+        let (to_key, _) = DepthToKey::new(convention.meaning, self.projection);
+        to_key.inverse_distance_per_key(self.projection)
+    }
+
     /// Displacements of the grid in output pixels; NaN where none is known.
     pub(super) fn decode_motion(
         &self,

@@ -43,6 +43,13 @@ pub struct DecodeScratch {
     columns: [Vec<u16>; 2],
 }
 
+impl DecodeScratch {
+    /// Gives `key`, which was decoded last and has motion, its motion as decoded.
+    pub fn hand_displacement(&mut self, key: &mut KeyFrame) {
+        std::mem::swap(&mut self.displacement, &mut key.displacement);
+    }
+}
+
 /// What was noticed while a key was decoded.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct DecodeReport {
@@ -71,12 +78,16 @@ pub fn decode_key(
     key.content_time = input.content_time;
     key.is_cut = input.is_cut;
     key.camera = input.camera;
+    key.motion_from_camera = input.motion_from_camera;
+    key.acceleration.resize(0, 0);
+    key.displacement.resize(0, 0);
     key.valid =
         color::decode_color(pool, format, &planes.color, &mut scratch.color, &mut key.color);
     let projection =
         input.camera.and_then(|camera| ProjectionDepth::from_projection(&camera.projection));
     let field = FieldInput::new(format, input, &planes, projection, key.valid, pool)?;
     key.field_offset = field.offset();
+    key.inverse_distance_per_depth_key = field.inverse_distance_per_depth_key();
     key.motion_from = None;
     if field.has_depth() {
         report.depth_contradiction = field.decode_depth(&mut scratch.columns, &mut key.depth);

@@ -219,6 +219,7 @@ fn constants_of_the_shaders_are_those_of_the_cpu() {
         ("FARTHEST", i64::from(FARTHEST)),
         ("SOURCE_BITS", i64::from(SOURCE_BITS)),
         ("MAX_CELLS", i64::from(MAX_CELLS)),
+        ("LARGEST", i64::from(crate::trajectory::effective::LARGEST)),
         ("RGBA8", i64::from(format_code(Rgba8))),
         ("RGB10A2", i64::from(format_code(Rgb10a2))),
         ("RGBA16F", i64::from(format_code(Rgba16f))),

@@ -32,6 +32,7 @@ use crate::key::KeyFrame;
 use crate::method::Method;
 use crate::params::{FrameParams, map_words};
 use crate::phase::Phase;
+use crate::trajectory::effective::EFFECTIVE;
 use crate::warp::blend::BLEND;
 use crate::warp::gather::GATHER;
 use crate::warp::grid::{GRID, LANES, MeshWords, TRIANGLE_BYTES};
@@ -46,18 +47,26 @@ use transfer::{Download, Upload};
 fn key_shaders(method: Method) -> &'static [&'static Shader] {
     match method {
         Method::Linear => &[&SOURCE],
-        Method::Hold | Method::Blend | Method::Gather | Method::Grid => &[],
+        _ => &[],
     }
 }
 
-/// The shaders that make a frame, in order.
+/// The shaders that run before those of a frame where the field of its key accelerates.
+fn accelerating_shaders(method: Method) -> &'static [&'static Shader] {
+    match method {
+        Method::Linear => &[&EFFECTIVE],
+        _ => &[],
+    }
+}
+
+/// The shaders that make a frame, in order. `method` is one that has a warp of its own.
 fn frame_shaders(method: Method) -> &'static [&'static Shader] {
     match method {
-        Method::Hold => &[],
         Method::Blend => &[&BLEND],
         Method::Gather => &[&GATHER],
         Method::Grid => &[&GRID],
         Method::Linear => &[&SCATTER, &RESOLVE, &FAR_SIDE, &CLASSIFY, &LINEAR],
+        _ => &[],
     }
 }
 
@@ -73,9 +82,10 @@ pub(crate) struct GpuBackend {
     gpu: Arc<Gpu>,
     method: Method,
     key_steps: Vec<Step>,
+    accelerating_steps: Vec<Step>,
     frame_steps: Vec<Step>,
     planes: Planes,
-    field_upload: [Upload; 3],
+    field_upload: [Upload; 4],
     color_upload: Upload,
     download: Download,
     /// The field map as the shaders read it.
@@ -100,6 +110,7 @@ impl GpuBackend {
             gpu: Arc::clone(gpu),
             method,
             key_steps: steps(key_shaders(method))?,
+            accelerating_steps: steps(accelerating_shaders(method))?,
             frame_steps: steps(frame_shaders(method))?,
             planes: Planes::default(),
             field_upload: Default::default(),
@@ -148,8 +159,11 @@ impl GpuBackend {
                 (Slot::Velocity, key.velocity.data().as_bytes()),
                 (Slot::Depth, depth),
                 (Slot::Tables, self.tables.as_bytes()),
+                (Slot::Acceleration, key.acceleration.data().as_bytes()),
             ]
         };
+        let parts = parts.iter().filter(|(_, bytes)| !bytes.is_empty());
+        let sent = parts.clone().count();
         for (upload, (slot, bytes)) in self.field_upload.iter_mut().zip(parts) {
             let target = self.planes.sized(&gpu, *slot, bytes.len() as u64)?;
             upload.write(&gpu, &mut commands, bytes, target)?;
@@ -159,7 +173,7 @@ impl GpuBackend {
         self.planes.write_params(&gpu, &params)?;
         dispatch(&gpu, &mut commands, &self.key_steps, &self.planes, &params)?;
         let submission = gpu.queue.submit([commands.finish()]);
-        for upload in &mut self.field_upload {
+        for upload in self.field_upload.iter_mut().take(sent) {
             upload.submitted(&submission);
         }
         Ok(())
@@ -201,6 +215,7 @@ impl GpuBackend {
                     Slot::Color
                     | Slot::Older
                     | Slot::Velocity
+                    | Slot::Acceleration
                     | Slot::Depth
                     | Slot::Tables
                     | Slot::Vertices
@@ -230,6 +245,9 @@ impl GpuBackend {
             self.planes.sized(&gpu, Slot::Out, size)?;
             self.planes.write_params(&gpu, &params)?;
             let mut commands = gpu.device.create_command_encoder(&Default::default());
+            if !frame.newest.acceleration.data().is_empty() {
+                dispatch(&gpu, &mut commands, &self.accelerating_steps, &self.planes, &params)?;
+            }
             dispatch(&gpu, &mut commands, &self.frame_steps, &self.planes, &params)?;
             let made = self.planes.sized(&gpu, Slot::Out, size)?;
             self.download.copy(&gpu, &mut commands, made, size);

@@ -3,7 +3,7 @@
 use super::test_adapters::test_gpus;
 use super::*;
 use crate::backend::cpu::CpuBackend;
-use crate::key::Velocity;
+use crate::key::{Acceleration, Velocity};
 use crate::plane::{Plane, Rect};
 use crate::testing::{hash, map_of, noise, plane, pool};
 use crate::time::MonoTime;
@@ -162,6 +162,35 @@ fn every_adapter_warps_without_depth() {
             let key = key(color, Plane::default(), velocity_noise(40, 30, 15, seed));
             assert_same(&gpu, Method::Linear, &key, "no depth");
             assert_same(&gpu, Method::Grid, &key, "no depth");
+        }
+    }
+}
+
+#[test]
+fn every_adapter_accelerates_as_the_cpu_does_and_forgets_it_with_the_next_key() {
+    let name = "every_adapter_accelerates_as_the_cpu_does_and_forgets_it_with_the_next_key";
+    for gpu in test_gpus(name) {
+        for (seed, reach) in [(0, 12), (1, 300), (2, 0)] {
+            let steady = key(
+                noise(ColorFormat::Rgba8, 90, 70, seed),
+                depth_noise(45, 35, seed),
+                velocity_noise(45, 35, reach, seed),
+            );
+            let acceleration = velocity_noise(45, 35, 2 * reach + 3, seed + 8);
+            let moves = |v: Velocity| if v.is_trackable() { v } else { Velocity::default() };
+            let acceleration = plane(45, 35, |x, y| {
+                let Velocity { x, y } = moves(acceleration.at(x, y));
+                Acceleration { x, y }
+            });
+            let accelerating = KeyFrame { acceleration, ..steady.clone() };
+            assert_same(&gpu, Method::Linear, &accelerating, "acceleration");
+            let phase = Phase::from_f64(0.7);
+            let expected = on_cpu(Method::Linear, &[&steady], phase);
+            let keys = [&accelerating, &steady, &accelerating, &steady];
+            let found = on_gpu(&gpu, Method::Linear, &keys, [phase].into_iter());
+            assert_eq!(difference(&found[0], &expected), None, "steady again on {}", gpu.name());
+            let bent = on_cpu(Method::Linear, &[&accelerating], phase);
+            assert!(difference(&bent, &expected).is_some(), "acceleration changes the picture");
         }
     }
 }

@@ -62,6 +62,37 @@ pub fn dilate_motion(
     );
 }
 
+/// Copies to each cell of `to` what the cell of `from` that it takes its motion from holds, (2).
+/// `depth` has the size of `from` or is empty.
+pub fn dilate_cells<T: Copy + Default + Send + Sync>(
+    pool: &ThreadPool,
+    depth: &Plane<u32>,
+    from: &Plane<T>,
+    to: &mut Plane<T>,
+) {
+    to.resize(from.width(), from.height());
+    for_each_row(
+        pool,
+        to,
+        #[inline(always)]
+        |y, row| {
+            row.copy_from_slice(from.row(y));
+            if depth.data().is_empty() {
+                return;
+            }
+            for_each_block(depth, y, |first, near| {
+                let centres = &depth.row(y)[first as usize..][..near.len()];
+                for (x, (&near, &centre)) in (first..).zip(near.iter().zip(centres)) {
+                    if near != centre {
+                        let (column, row_of) = nearest_in_3x3(depth, x, y, near);
+                        row[x as usize] = from.at(column, row_of);
+                    }
+                }
+            });
+        },
+    );
+}
+
 /// The depth keys of the surfaces that the cells of row `y` take their motion from, (2), into
 /// `dilated`.
 #[inline(always)]

@@ -4,7 +4,7 @@ use rayon::ThreadPool;
 
 use crate::field::FieldMap;
 use crate::fill::far_side::{FarScratch, far_side};
-use crate::key::KeyFrame;
+use crate::key::{KeyFrame, Velocity};
 use crate::phase::Phase;
 use crate::plane::Plane;
 use crate::warp::resolve::{CellClass, classify, resolve};
@@ -29,6 +29,11 @@ impl LinearScratch {
     /// Prepares for the frames after `key`, which has a velocity field.
     pub fn take_key(&mut self, pool: &ThreadPool, key: &KeyFrame) {
         self.source.update(pool, key);
+    }
+
+    /// Takes the velocities of one frame of the key, whose field accelerates.
+    pub fn take_velocity(&mut self, pool: &ThreadPool, velocity: &Plane<Velocity>) {
+        self.source.update_velocity(pool, velocity);
     }
 
     /// Whether no source cell landed on cell (`x`, `y`) of the field grid.

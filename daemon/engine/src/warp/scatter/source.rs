@@ -36,11 +36,18 @@ impl SourceField {
     /// does to a moving camera, and better than a fold-over that shows both surfaces at random.
     /// Depth is left out where nothing moves: nothing can fold over.
     pub fn update(&mut self, pool: &ThreadPool, key: &KeyFrame) {
-        let (width, height) = (key.velocity.width(), key.velocity.height());
-        self.velocity.resize(width, height);
-        self.depth.resize(width, height);
-        let has_depth = !key.depth.data().is_empty();
-        self.reach.resize(1, height);
+        self.update_velocity(pool, &key.velocity);
+        self.depth.resize(key.velocity.width(), key.velocity.height());
+        if self.is_still() && key.acceleration.data().is_empty() {
+            return;
+        }
+        self.update_depth(pool, key);
+    }
+
+    /// Takes velocities on the grid of the key that was taken last.
+    pub fn update_velocity(&mut self, pool: &ThreadPool, velocity: &Plane<Velocity>) {
+        self.velocity.resize(velocity.width(), velocity.height());
+        self.reach.resize(1, velocity.height());
         for_each_row_of_two(
             pool,
             &mut self.velocity,
@@ -48,7 +55,7 @@ impl SourceField {
             #[inline(always)]
             |y, row, reach| {
                 let [mut slowest, mut fastest, mut moved] = [i16::MAX, i16::MIN, 0];
-                for (held, &velocity) in row.iter_mut().zip(key.velocity.row(y)) {
+                for (held, &velocity) in row.iter_mut().zip(velocity.row(y)) {
                     *held = if velocity.is_trackable() { velocity } else { Velocity::default() };
                     (slowest, fastest) = (slowest.min(held.y), fastest.max(held.y));
                     moved |= held.x | held.y;
@@ -56,9 +63,10 @@ impl SourceField {
                 reach[0] = Reach { slowest, fastest, moves: moved != 0 };
             },
         );
-        if self.is_still() {
-            return;
-        }
+    }
+
+    fn update_depth(&mut self, pool: &ThreadPool, key: &KeyFrame) {
+        let has_depth = !key.depth.data().is_empty();
         let velocity = &self.velocity;
         for_each_row(
             pool,

@@ -1,0 +1,202 @@
+//! One stream's ladder: prepares the rungs for each key and fills in its trajectories.
+//!
+//! [`Models`] holds what the rungs need of one key, small things that are worked out once; a rung's
+//! answer for a cell is then a function of it, the key's planes and the key before. [`Ladder`] takes
+//! the answers of the rung that the method names for every cell, lets each cell take those of the
+//! surface that its colour belongs to (dilation), and leaves them in the key as fixed point.
+//!
+//! Where a rung has no answer, the motion field itself goes on: [`Rung::Linear`].
+
+use foreframe_perception::tracking::tracked_share;
+use rayon::ThreadPool;
+
+use super::affine::AffineField;
+use super::camera_path::{CameraOrder, CameraPath, Pose};
+use super::curve::Curve;
+use super::dilate_motion::dilate_cells;
+use super::global::Homography;
+use super::grid::Grid;
+use super::quadratic::Quadratic;
+use super::rung::Rung;
+use super::world::World;
+use crate::bands::for_each_row_of_two;
+use crate::key::{Acceleration, KeyFrame, Velocity};
+use crate::method::Method;
+use crate::plane::Plane;
+use crate::time::MonoTime;
+
+/// What the rungs need of one key beside its planes.
+#[derive(Clone, Debug, Default)]
+pub struct Models {
+    grid: Grid,
+    global: Option<Homography>,
+    affine: AffineField,
+    /// By [`CameraOrder`].
+    worlds: [Option<World>; CameraOrder::ALL.len()],
+}
+
+impl Models {
+    /// The grid of the key's field.
+    #[must_use]
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// The model of a camera order.
+    #[must_use]
+    pub fn world(&self, order: CameraOrder) -> Option<&World> {
+        self.worlds[order as usize].as_ref()
+    }
+
+    /// Where `rung` takes the surface of a cell; None where it cannot tell. `older` reads the key
+    /// before.
+    #[must_use]
+    #[inline(always)]
+    pub fn curve(
+        &self,
+        rung: Rung,
+        key: &KeyFrame,
+        older: Option<&Quadratic<'_>>,
+        x: u32,
+        y: u32,
+    ) -> Option<Curve> {
+        let grid = &self.grid;
+        let curve = match rung {
+            Rung::Hold => Some(Curve::default()),
+            Rung::Linear => Some(Curve::straight(key.displacement.at(x, y))),
+            Rung::Global => self.global.map(|global| global.curve(grid.centre(x, y))),
+            Rung::Affine => self.affine.curve(key, grid, x, y),
+            Rung::Quadratic => older.and_then(|older| older.curve(key, grid, x, y)),
+            Rung::World(order) => {
+                self.worlds[order as usize].as_ref().map(|world| world.curve(key, grid, x, y))
+            }
+        };
+        curve.filter(Curve::is_known)
+    }
+}
+
+/// What one stream knows from key to key.
+#[derive(Debug)]
+pub struct Ladder {
+    rung: Rung,
+    /// Pixels per degree of visual angle, where motion that no eye can follow is damped.
+    pixels_per_degree: Option<f32>,
+    path: CameraPath,
+    models: Models,
+    velocity: Plane<Velocity>,
+    acceleration: Plane<Acceleration>,
+}
+
+impl Ladder {
+    /// For streams of `method`; None where it takes the motion field as it is.
+    #[must_use]
+    pub fn new(method: Method, pixels_per_degree: Option<f32>) -> Option<Self> {
+        let rung = match method {
+            Method::Global => Rung::Global,
+            Method::Affine => Rung::Affine,
+            Method::Quadratic => Rung::Quadratic,
+            Method::World => Rung::World(CameraOrder::Constant),
+            Method::Hold | Method::Blend | Method::Gather | Method::Grid | Method::Linear => {
+                return None;
+            }
+        };
+        Some(Self {
+            rung,
+            pixels_per_degree,
+            path: CameraPath::default(),
+            models: Models::default(),
+            velocity: Plane::default(),
+            acceleration: Plane::default(),
+        })
+    }
+
+    /// Gives `key` its trajectories. It was decoded with its displacement; `older` is the key before
+    /// it, unless this one is a cut.
+    pub fn take_key(&mut self, pool: &ThreadPool, key: &mut KeyFrame, older: Option<&KeyFrame>) {
+        if key.is_cut {
+            self.path.cut();
+        }
+        if let Some(camera) = key.camera {
+            self.path.push(Pose { time: key.content_time, camera });
+        }
+        if key.displacement.data().is_empty() {
+            return;
+        }
+        self.prepare(pool, key);
+        self.fill(pool, key, older);
+    }
+
+    /// Works out what the rung needs of `key`.
+    fn prepare(&mut self, pool: &ThreadPool, key: &KeyFrame) {
+        self.models.grid = Grid::of(key);
+        match self.rung {
+            Rung::Global => self.models.global = Homography::fit(key, &self.models.grid),
+            Rung::Affine => self.models.affine.update(pool, key, &self.models.grid),
+            Rung::World(_) => self.models.worlds = self.worlds(key),
+            Rung::Hold | Rung::Linear | Rung::Quadratic => {}
+        }
+    }
+
+    /// The camera's ways on from `key`, where depth, cameras and times tell them.
+    fn worlds(&self, key: &KeyFrame) -> [Option<World>; CameraOrder::ALL.len()] {
+        CameraOrder::ALL.map(|order| {
+            let is_newest = |pose: &&Pose| pose.time == key.content_time;
+            self.path.newest().filter(is_newest)?;
+            let span = key.motion_span().filter(|_| !key.depth.data().is_empty())?;
+            let older = self.camera_at(key, key.motion_from?)?;
+            World::new(key, &older, &self.path.onward(order)?, span)
+        })
+    }
+
+    /// The camera at the time that the motion of `key` points back to.
+    fn camera_at(&self, key: &KeyFrame, time: MonoTime) -> Option<crate::key::Camera> {
+        self.path.at(time).map(|pose| pose.camera).or(key.motion_from_camera)
+    }
+
+    /// Fills in velocity and acceleration of `key`.
+    fn fill(&mut self, pool: &ThreadPool, key: &mut KeyFrame, older: Option<&KeyFrame>) {
+        let quadratic = older.and_then(|older| Quadratic::new(key, older));
+        let [width, height] = self.models.grid.cells;
+        self.velocity.resize(width, height);
+        self.acceleration.resize(width, height);
+        let px_per_span = self.px_per_span(key);
+        let (models, rung, held) = (&self.models, self.rung, &*key);
+        for_each_row_of_two(
+            pool,
+            &mut self.velocity,
+            &mut self.acceleration,
+            #[inline(always)]
+            |y, velocities, accelerations| {
+                let cells = (0..).zip(velocities.iter_mut().zip(accelerations));
+                for (x, (velocity, acceleration)) in cells {
+                    let curve = models
+                        .curve(rung, held, quadratic.as_ref(), x, y)
+                        .unwrap_or_else(|| Curve::straight(held.displacement.at(x, y)));
+                    (*velocity, *acceleration) = damped(curve, px_per_span).quantise();
+                }
+            },
+        );
+        dilate_cells(pool, &key.depth, &self.velocity, &mut key.velocity);
+        if self.acceleration.data().iter().all(|a| *a == Acceleration::default()) {
+            key.acceleration.resize(0, 0);
+        } else {
+            dilate_cells(pool, &key.depth, &self.acceleration, &mut key.acceleration);
+        }
+    }
+
+    /// Pixels per motion span of a speed of one degree per second, where motion is damped.
+    #[expect(clippy::cast_possible_truncation, reason = "seconds need no more than an f32")]
+    fn px_per_span(&self, key: &KeyFrame) -> Option<f32> {
+        let seconds = key.motion_span()?.as_secs_f64() as f32;
+        self.pixels_per_degree.map(|pixels_per_degree| pixels_per_degree * seconds)
+    }
+}
+
+/// The part of a curve that an eye can follow: (3) and (4) of [`super::dilate_motion`], of its chord.
+#[inline(always)]
+fn damped(curve: Curve, px_per_span: Option<f32>) -> Curve {
+    let Some(px_per_span) = px_per_span else { return curve };
+    let [x, y] = curve.one;
+    let share = tracked_share(libm::sqrtf(x * x + y * y) / px_per_span);
+    Curve { half: curve.half.map(|d| d * share), one: curve.one.map(|d| d * share) }
+}

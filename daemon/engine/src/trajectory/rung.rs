@@ -1,0 +1,21 @@
+//! The rungs of the ladder, by name.
+
+use super::camera_path::CameraOrder;
+
+/// A model of how a surface goes on from a key, cheapest first.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
+pub enum Rung {
+    /// It stays where it is.
+    Hold,
+    /// It moves with the whole image.
+    Global,
+    /// It goes on by its motion vector.
+    #[default]
+    Linear,
+    /// It goes on by the affine map that its surroundings follow.
+    Affine,
+    /// It goes on by the change of its motion.
+    Quadratic,
+    /// It is seen by a camera that goes on.
+    World(CameraOrder),
+}

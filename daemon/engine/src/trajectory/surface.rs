@@ -1,0 +1,88 @@
+//! Reads the field of a key at a place between cells, from those that lie on one surface.
+
+use super::grid::Grid;
+use crate::key::KeyFrame;
+
+/// Depth keys of one surface may differ by this fraction (a shift of 3: one eighth) from one key to
+/// the next and from a cell to its neighbour: ground seen at a low angle differs by as much.
+const DEPTH_TOLERANCE_SHIFT: u32 = 3;
+
+/// Whether two depth keys may be of one surface.
+#[must_use]
+#[inline(always)]
+pub fn is_same_surface(a: u32, b: u32) -> bool {
+    a.abs_diff(b) <= (a.max(b) >> DEPTH_TOLERANCE_SHIFT) + 1
+}
+
+/// The 2x2 cells around a place with their weights.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Around {
+    /// Column, row and weight. Cells of weight 0 may repeat others.
+    pub cells: [(u32, u32, f32); 4],
+}
+
+impl Around {
+    /// Around `position` (pixels); None outside the picture.
+    #[must_use]
+    #[inline(always)]
+    pub fn new(grid: &Grid, position: [f32; 2]) -> Option<Self> {
+        let place = grid.place(position);
+        let (x, y) = (axis(place[0], grid.cells[0])?, axis(place[1], grid.cells[1])?);
+        let cell = |i: usize, j: usize| (x[i].0, y[j].0, x[i].1 * y[j].1);
+        Some(Self { cells: [cell(0, 0), cell(1, 0), cell(0, 1), cell(1, 1)] })
+    }
+
+    /// Of those cells on the surface of depth key `depth` (any, where `key` has no depth), the one
+    /// of the largest weight.
+    #[must_use]
+    pub fn nearest(&self, key: &KeyFrame, depth: Option<u32>) -> Option<(u32, u32)> {
+        let mut best = (0.0, None);
+        for (x, y, weight) in self.cells {
+            if weight > best.0 && is_on(key, x, y, depth) {
+                best = (weight, Some((x, y)));
+            }
+        }
+        best.1
+    }
+
+    /// The motion of `key` here, from the cells on the surface of depth key `depth` whose motion is
+    /// known.
+    #[must_use]
+    #[inline(always)]
+    pub fn motion(&self, key: &KeyFrame, depth: Option<u32>) -> Option<[f32; 2]> {
+        let (mut weights, mut sum) = (0.0, [0.0; 2]);
+        for (x, y, weight) in self.cells {
+            let [dx, dy] = key.displacement.at(x, y);
+            if weight > 0.0 && dx.is_finite() && dy.is_finite() && is_on(key, x, y, depth) {
+                weights += weight;
+                sum = [sum[0] + weight * dx, sum[1] + weight * dy];
+            }
+        }
+        (weights > 0.0).then(|| [sum[0] / weights, sum[1] / weights])
+    }
+}
+
+#[inline(always)]
+fn is_on(key: &KeyFrame, x: u32, y: u32, depth: Option<u32>) -> bool {
+    match depth {
+        Some(depth) if !key.depth.data().is_empty() => is_same_surface(depth, key.depth.at(x, y)),
+        _ => true,
+    }
+}
+
+/// The two cells around a place along one axis, with their weights. None outside the picture, which
+/// reaches half a cell beyond the outer centres, and for NaN.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "clamped to the grid")]
+#[expect(clippy::cast_sign_loss, reason = "clamped to the grid")]
+#[expect(clippy::cast_precision_loss, reason = "cells up to 8192 are exact")]
+fn axis(place: f32, cells: u32) -> Option<[(u32, f32); 2]> {
+    if !(-0.5..=cells as f32 - 0.5).contains(&place) {
+        return None;
+    }
+    let last = cells - 1;
+    let clamped = place.clamp(0.0, last as f32);
+    let low = clamped as u32;
+    let way = clamped - low as f32;
+    Some([(low, 1.0 - way), ((low + 1).min(last), way)])
+}

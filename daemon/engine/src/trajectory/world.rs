@@ -1,0 +1,89 @@
+//! The `world` rung: depth and cameras say how the picture moves, motion says what moves besides.
+//!
+//! With c(x, p) the displacement at phase p of a still point seen at x as the camera goes on
+//! ([`super::camera_path`]), and c'(x) how far the camera's motion since the older key moved it:
+//!
+//! ```text
+//! (1) m    = D - c'(x)                       motion of its own, in the picture; D the motion field
+//! (2) d(p) = c(x, p) + m p
+//! ```
+//!
+//! A still point has m = 0 and follows the camera's path alone; one that moves keeps its own
+//! velocity on top. Where the field knows no motion a point is taken to be still; and so is the
+//! background where nothing was drawn (depth key 0), which engines leave without vectors.
+
+use super::camera_path::{Onward, Reprojection};
+use super::curve::Curve;
+use super::grid::Grid;
+use crate::key::{Camera, KeyFrame};
+use crate::time::MonoSpan;
+
+/// The camera's motion around one key.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct World {
+    /// Since the older key: from the picture of the key to that one.
+    older: Reprojection,
+    /// Until phases 1/2 and 1.
+    half: Reprojection,
+    one: Reprojection,
+    /// Inverse distance of a depth key of 1.
+    per_depth_key: f32,
+}
+
+impl World {
+    /// Of `key`, which has depth and a camera, as the camera goes `onward` from it. `older` is the
+    /// camera at the time that its motion points back to, `span` before. None where its projection
+    /// tells no distance.
+    #[must_use]
+    pub fn new(key: &KeyFrame, older: &Camera, onward: &Onward, span: MonoSpan) -> Option<Self> {
+        let camera = key.camera.as_ref()?;
+        let per_depth_key = key.inverse_distance_per_depth_key?;
+        Some(Self {
+            older: super::camera_path::between(camera, older, key.valid)?,
+            half: onward.reprojection(key.valid, span.scale(1, 2))?,
+            one: onward.reprojection(key.valid, span)?,
+            per_depth_key,
+        })
+    }
+
+    /// (2) of a cell. NaN where the point is not in front of the camera.
+    #[must_use]
+    #[inline(always)]
+    pub fn curve(&self, key: &KeyFrame, grid: &Grid, x: u32, y: u32) -> Curve {
+        let at = grid.centre(x, y);
+        let depth = key.depth.at(x, y);
+        let q = self.inverse_distance(depth);
+        let displacement = if depth == 0 { [f32::NAN; 2] } else { key.displacement.at(x, y) };
+        let [own_x, own_y] = self.own_motion(at, q, displacement);
+        let (half, one) = (self.half.place(at, q), self.one.place(at, q));
+        Curve {
+            half: [half[0] - at[0] + 0.5 * own_x, half[1] - at[1] + 0.5 * own_y],
+            one: [one[0] - at[0] + own_x, one[1] - at[1] + own_y],
+        }
+    }
+
+    /// 1 / w of a depth key.
+    #[inline(always)]
+    #[expect(clippy::cast_precision_loss, reason = "24 bits of depth are enough")]
+    fn inverse_distance(&self, depth: u32) -> f32 {
+        depth as f32 * self.per_depth_key
+    }
+
+    /// (1), 0 where no motion is known.
+    #[inline(always)]
+    fn own_motion(&self, at: [f32; 2], q: f32, displacement: [f32; 2]) -> [f32; 2] {
+        let was = self.older.place(at, q);
+        let own = [0, 1].map(|axis| displacement[axis] - (at[axis] - was[axis]));
+        let is_known = own[0].is_finite() & own[1].is_finite();
+        if is_known { own } else { [0.0; 2] }
+    }
+
+    /// Own motion of a cell, pixels per span; None where no motion is known.
+    #[must_use]
+    pub fn own_motion_of(&self, key: &KeyFrame, grid: &Grid, x: u32, y: u32) -> Option<[f32; 2]> {
+        let displacement = key.displacement.at(x, y);
+        let is_known = displacement[0].is_finite() && displacement[1].is_finite();
+        let q = self.inverse_distance(key.depth.at(x, y));
+        is_known.then(|| self.own_motion(grid.centre(x, y), q, displacement))
+    }
+}
