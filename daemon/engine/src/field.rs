@@ -25,6 +25,7 @@ pub struct FieldAxis {
     cells: u32,
     offset: i32,
     centre: Vec<i32>,
+    /// One entry more than pixels, so that a wide read of the last one stays inside.
     cell: Vec<u16>,
     before: Vec<[u16; 2]>,
     /// The first pixel of each cell, and the end of the last.
@@ -76,6 +77,7 @@ impl FieldAxis {
         self.pixels.extend(
             (0..=cells).map(|i| self.cell.partition_point(|cell| u32::from(*cell) < i) as u16),
         );
+        self.cell.push(last as u16);
     }
 
     /// Number of cells.
@@ -118,6 +120,12 @@ impl FieldAxis {
     #[must_use]
     pub fn cell_of_each(&self, index: u32, count: usize) -> &[u16] {
         &self.cell[index as usize..][..count]
+    }
+
+    /// [`Self::cell_of`] of all pixels, and one more entry. Every entry is a cell of the grid.
+    #[must_use]
+    pub fn cell_of_all(&self) -> &[u16] {
+        &self.cell
     }
 
     /// The last cell whose centre is not right of or below pixel `first_pixel + index`, and the

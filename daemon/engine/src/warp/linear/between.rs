@@ -6,8 +6,6 @@
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 
-use std::cell::RefCell;
-
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::__m256i;
 
@@ -18,37 +16,26 @@ use crate::warp::sample::Positions;
 /// Pixels of one wide step.
 const LANES: usize = 8;
 
-/// Displacements of the cells of a row, interpolated down to a row of pixels, x and y. The last
-/// one is repeated as often as a wide step reads beyond it.
+/// Displacements of the cells of a row, interpolated down to a row of pixels, x and y: anything
+/// around broken cells. The last one is repeated as often as a wide step reads beyond it.
 #[derive(Debug, Default)]
 pub(super) struct RowCells {
     xs: Vec<i32>,
     ys: Vec<i32>,
-}
-
-thread_local! {
-    /// Kept from row to row.
-    static CELLS: RefCell<RowCells> = RefCell::default();
-}
-
-/// Calls `work` with the cells for row `index_y` of the valid rectangle.
-#[inline(always)]
-pub(super) fn with_row_cells(frame: &Frame<'_>, index_y: u32, work: impl FnOnce(&RowCells)) {
-    // Taken and put back, as a closure given to the thread's storage is not made for AVX2.
-    let mut cells = CELLS.take();
-    cells.update(frame, index_y);
-    work(&cells);
-    CELLS.set(cells);
+    /// Whether there are more cells than pixels: wide steps do not hold those.
+    pub(super) is_finer: bool,
 }
 
 impl RowCells {
+    /// Makes these the cells for row `index_y` of the valid rectangle.
     #[inline(always)]
-    fn update(&mut self, frame: &Frame<'_>, index_y: u32) {
+    pub(super) fn update(&mut self, frame: &Frame<'_>, index_y: u32) {
         let carried = &frame.field.carried;
         let (y, way) = frame.map.y.before(index_y);
         let (above, below) = (carried.row(y), carried.row((y + 1).min(carried.height() - 1)));
         let (phase, way) = (frame.phase.q12(), way.cast_signed());
         let count = above.len();
+        self.is_finer = frame.map.x.cells() > frame.map.x.pixels();
         for axis in [&mut self.xs, &mut self.ys] {
             axis.resize(count + LANES, 0);
         }
@@ -93,12 +80,12 @@ impl RowCells {
         [first, index_y]: [u32; 2],
         pixels: usize,
     ) -> RowPositions<'a> {
-        let p = [frame.valid.x + first, frame.valid.y + index_y];
         RowPositions {
             xs: &self.xs,
             ys: &self.ys,
             places: frame.map.x.before_each(first, pixels),
-            p: p.map(|p| (p << 8).cast_signed()),
+            is_finer: self.is_finer,
+            p: frame.centre([first, index_y]),
         }
     }
 }
@@ -112,6 +99,23 @@ pub(super) struct RowPositions<'a> {
     places: &'a [[u16; 2]],
     /// Centre of the first pixel, Q8.
     p: [i32; 2],
+    is_finer: bool,
+}
+
+impl RowPositions<'_> {
+    /// All of them, into lists as long.
+    #[inline(always)]
+    pub(super) fn list(&self, xs: &mut [i32], ys: &mut [i32]) {
+        let mut done = 0;
+        #[cfg(target_arch = "x86_64")]
+        if has_avx2() && !self.is_finer {
+            // SAFETY: the processor has AVX2, asked for just above.
+            done = unsafe { avx2::list(self, xs, ys) };
+        }
+        for (i, (x, y)) in xs.iter_mut().zip(ys).enumerate().skip(done) {
+            [*x, *y] = self.at(i);
+        }
+    }
 }
 
 impl Positions for RowPositions<'_> {

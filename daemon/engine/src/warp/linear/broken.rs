@@ -1,90 +1,109 @@
-//! The pixels of a broken cell: (2) of [`super`].
+//! Where the pixels of broken cells are read: (2) of [`super`].
+//!
+//! The broken pixels of a row are listed first and then looked at together: they lie on edges, a
+//! few here and a few there, and wide steps should be full.
+
+#[cfg(target_arch = "x86_64")]
+mod avx2;
 
 use super::cpu::Frame;
-use super::fill::hole_pixel;
-use crate::color::Texel;
+use super::fill::hole_place;
 use crate::key::Velocity;
-use crate::plane::Plane;
+#[cfg(target_arch = "x86_64")]
+use crate::simd::has_avx2;
 use crate::warp::moved;
-use crate::warp::resolve::HOLE;
-use crate::warp::sample::sample;
+use crate::warp::resolve::{CellClass, HOLE};
 
+/// Cells whose classes are looked at together.
+const CLASSES: usize = 32;
 /// Cells of a 3x3 neighbourhood.
 const NEIGHBOURS: usize = 9;
 
-/// Makes the pixels `texels` of a row that lie in `cell`, the centre of the first of them at `p`.
-pub(super) fn broken_cell<T: Texel>(
-    frame: &Frame<'_>,
-    color: &Plane<T>,
-    cell: [u32; 2],
-    [p_x, p_y]: [i32; 2],
-    texels: &mut [T],
-) {
-    let candidates = Candidates::around(frame, cell);
-    for (p_x, texel) in (p_x..).step_by(256).zip(texels) {
-        let p = [p_x, p_y];
-        *texel = match candidates.shown(frame, p) {
-            Some([x, y]) => sample(color, frame.valid, x, y),
-            None => hole_pixel(frame, color, cell, p),
-        };
-    }
+/// The pixels of a row that lie in broken cells, from left to right.
+#[derive(Debug, Default)]
+pub(super) struct BrokenRow {
+    /// Column, counted from the left of the valid rectangle, and cell.
+    pixels: Vec<[u16; 2]>,
+    /// Where each is read, Q8 pixels.
+    places: Vec<[i32; 2]>,
 }
 
-/// The displacements that 3x3 cells carry, in reading order, few of them twice.
-struct Candidates {
-    /// One more than there can be: the place of the next.
-    displacements: [[i32; 2]; NEIGHBOURS + 1],
-    count: usize,
-}
-
-impl Candidates {
+impl BrokenRow {
+    /// Lists the broken pixels of row `index_y` of the valid rectangle, and where they are read.
     #[inline(always)]
-    fn around(frame: &Frame<'_>, [cell_x, cell_y]: [u32; 2]) -> Self {
-        let carried = &frame.field.carried;
-        let mut found = Self { displacements: [[0; 2]; NEIGHBOURS + 1], count: 0 };
-        let columns =
-            cell_x.saturating_sub(1) as usize..=(cell_x + 1).min(carried.width() - 1) as usize;
-        // Looking again changes nothing, so it is enough to leave out the repetitions that are
-        // quick to see: of the cell to the left, and of the one above.
-        let mut above: &[[i16; 2]] = &[[HOLE.x, HOLE.y]; 3];
-        for y in cell_y.saturating_sub(1)..=(cell_y + 1).min(carried.height() - 1) {
-            let row = &carried.row(y)[columns.clone()];
-            let mut left = [HOLE.x, HOLE.y];
-            for (&[x, y], &above) in row.iter().zip(above) {
-                let is_new = ([x, y] != left) & ([x, y] != above) & ([x, y] != [HOLE.x, HOLE.y]);
-                left = [x, y];
-                found.displacements[found.count] = moved(Velocity { x, y }, frame.phase);
-                found.count += usize::from(is_new);
+    pub(super) fn update(&mut self, frame: &Frame<'_>, index_y: u32) {
+        self.pixels.clear();
+        self.places.clear();
+        let classes = frame.field.class.row(frame.map.y.cell_of(index_y));
+        for (group, classes) in classes.chunks(CLASSES).enumerate() {
+            let is_broken = |class: &CellClass| *class == CellClass::Broken;
+            if !classes.iter().fold(false, |any, class| any | is_broken(class)) {
+                continue;
             }
-            above = row;
+            let cells = (group * CLASSES..).zip(classes);
+            for (cell, _) in cells.filter(|(_, class)| is_broken(class)) {
+                let pixels = frame.map.x.pixels_of(cell);
+                self.pixels.extend(pixels.map(|column| [column, cell].map(|i| i as u16)));
+            }
         }
-        found
+        if self.pixels.is_empty() {
+            return;
+        }
+        let mut done = 0;
+        #[cfg(target_arch = "x86_64")]
+        if has_avx2() {
+            // SAFETY: the processor has AVX2, asked for just above.
+            done = unsafe { avx2::places(frame, index_y, &self.pixels, &mut self.places) };
+        }
+        for &[column, cell] in &self.pixels[done..] {
+            let p = frame.centre([u32::from(column), index_y]);
+            let cell = [u32::from(cell), frame.map.y.cell_of(index_y)];
+            self.places.push(place(frame, cell, p).unwrap_or_else(|| hole_place(frame, cell, p)));
+        }
     }
 
-    /// Where in the key the surface is that comes to `p`, if one does.
-    ///
-    /// Whether a candidate is good is as random as the edges that broken cells lie on, so that
-    /// nothing branches on it.
+    /// Takes the pixels before column `end` off the front of `rest`, which starts as all of them:
+    /// column and place of each.
     #[inline(always)]
-    fn shown(&self, frame: &Frame<'_>, p: [i32; 2]) -> Option<[i32; 2]> {
-        // Of candidates that do not come to p: no depth, and no error is larger.
-        let mut found = [(0, i32::MAX); NEIGHBOURS];
-        let mut nearest = 0;
-        let candidates = &self.displacements[..self.count.min(NEIGHBOURS)];
-        for (&[dx, dy], found) in candidates.iter().zip(&mut found) {
-            let (surface, is_inside) = frame.surface_near([p[0] - dx, p[1] - dy]);
-            let [near_dx, near_dy] = moved(surface.velocity, frame.phase);
-            let error = (near_dx - dx).abs() + (near_dy - dy).abs();
-            let comes = is_inside & (error <= frame.one_cell);
-            *found = if comes { (surface.depth, error) } else { (0, i32::MAX) };
-            nearest = nearest.max(found.0);
-        }
-        let (mut best, mut smallest) = (0, i32::MAX);
-        for (i, &(depth, error)) in found[..candidates.len()].iter().enumerate() {
-            let is_better = (depth >= nearest - (nearest >> 8)) & (error < smallest);
-            (best, smallest) = if is_better { (i, error) } else { (best, smallest) };
-        }
-        let [dx, dy] = self.displacements[best];
-        (smallest < i32::MAX).then_some([p[0] - dx, p[1] - dy])
+    pub(super) fn take(
+        &self,
+        rest: &mut usize,
+        end: u32,
+    ) -> impl ExactSizeIterator<Item = (u32, [i32; 2])> {
+        let from = *rest;
+        let pixels = &self.pixels[from..];
+        let count = pixels.iter().take_while(|[column, _]| u32::from(*column) < end).count();
+        *rest += count;
+        let places = &self.places[from..*rest];
+        pixels[..count].iter().zip(places).map(|([column, _], place)| (u32::from(*column), *place))
     }
+}
+
+/// Where in the key the surface is that comes to `p`, a pixel of `cell`, if one does.
+fn place(frame: &Frame<'_>, [cell_x, cell_y]: [u32; 2], p: [i32; 2]) -> Option<[i32; 2]> {
+    let carried = &frame.field.carried;
+    let rows = cell_y.saturating_sub(1)..=(cell_y + 1).min(carried.height() - 1);
+    let columns = cell_x.saturating_sub(1)..=(cell_x + 1).min(carried.width() - 1);
+    // Depth, error and place of those that come to p.
+    let mut found = [(0, i32::MAX, p); NEIGHBOURS];
+    let mut nearest = 0;
+    let cells = rows.flat_map(|y| columns.clone().map(move |x| carried.at(x, y)));
+    for ([x, y], found) in cells.zip(&mut found) {
+        let velocity = Velocity { x, y };
+        if velocity == HOLE {
+            continue;
+        }
+        let [dx, dy] = moved(velocity, frame.phase);
+        let q = [p[0] - dx, p[1] - dy];
+        let Some(surface) = frame.surface_at(q) else { continue };
+        let [near_dx, near_dy] = moved(surface.velocity, frame.phase);
+        let error = (near_dx - dx).abs() + (near_dy - dy).abs();
+        if error <= frame.one_cell {
+            *found = (surface.depth, error, q);
+            nearest = nearest.max(surface.depth);
+        }
+    }
+    let near = found.into_iter().filter(|(depth, ..)| *depth >= nearest - (nearest >> 8));
+    let best = near.min_by_key(|(_, error, _)| *error);
+    best.filter(|(_, error, _)| *error < i32::MAX).map(|(.., q)| q)
 }

@@ -1,18 +1,19 @@
 //! The reference of [`super`].
 
+use std::cell::RefCell;
+
 use rayon::ThreadPool;
 
 use super::LinearScratch;
-use super::between::with_row_cells;
-use super::broken::broken_cell;
+use super::between::RowCells;
+use super::broken::BrokenRow;
 use crate::color::{ColorPlane, Texel};
 use crate::field::FieldMap;
 use crate::key::{KeyFrame, Velocity};
 use crate::phase::Phase;
 use crate::plane::{Plane, Rect};
 use crate::warp::for_each_valid_row;
-use crate::warp::resolve::CellClass;
-use crate::warp::sample::{Positions as _, sample, sample_run};
+use crate::warp::sample::{Listed, sample_run};
 
 /// Warps `key` to `phase` into `out`, which has the key's size and format. `map` is the map of
 /// the key's field grid; `scratch` has taken the key.
@@ -29,7 +30,7 @@ pub fn warp_linear(
         return;
     }
     scratch.resolve(pool, map, phase);
-    let frame = Frame { field: scratch, map, valid: key.valid, phase, one_cell: one_cell(map) };
+    let frame = Frame::new(scratch, map, key.valid, phase);
     match (&key.color, out) {
         (ColorPlane::Rgba8(color), ColorPlane::Rgba8(out)) => gather(pool, &frame, color, out),
         (ColorPlane::Rgb10a2(color), ColorPlane::Rgb10a2(out)) => gather(pool, &frame, color, out),
@@ -73,79 +74,98 @@ fn gather<T: Texel>(pool: &ThreadPool, frame: &Frame<'_>, color: &Plane<T>, out:
     );
 }
 
-/// Pixels that are read together where they all move alike.
+/// Pixels that are read together.
 const BLOCK: usize = 64;
-/// Cells whose classes are looked at together.
-const CLASSES: usize = 32;
+
+/// What a row of pixels needs, kept from row to row.
+#[derive(Debug, Default)]
+struct RowScratch {
+    cells: RowCells,
+    broken: BrokenRow,
+}
+
+thread_local! {
+    static ROW: RefCell<RowScratch> = RefCell::default();
+}
 
 /// One row of the valid rectangle.
 #[inline(always)]
 fn gather_row<T: Texel>(frame: &Frame<'_>, color: &Plane<T>, index_y: u32, row: &mut [T]) {
-    let cell_y = frame.map.y.cell_of(index_y);
-    let class = frame.field.class.row(cell_y);
-    // Wide steps hold the cells of grids that are no finer than colour.
-    let is_finer = frame.map.x.cells() > frame.map.x.pixels();
-    with_row_cells(
-        frame,
-        index_y,
-        #[inline(always)]
-        |cells| {
-            for (block, texels) in (0..).zip(row.chunks_mut(BLOCK)) {
-                let first = block * BLOCK as u32;
-                let p = [frame.valid.x + first, frame.valid.y + index_y];
-                if let Some([dx, dy]) = cells.shared(frame, first, texels.len()) {
-                    let [p_x, p_y] = p.map(|p| (p << 8).cast_signed());
-                    sample_run(color, frame.valid, [p_x - dx, p_y - dy], texels);
-                    continue;
-                }
-                let positions = cells.positions(frame, [first, index_y], texels.len());
-                if is_finer {
-                    for (i, texel) in texels.iter_mut().enumerate() {
-                        let [x, y] = positions.at(i);
-                        *texel = sample(color, frame.valid, x, y);
-                    }
-                } else {
-                    T::sample_each(color, frame.valid, &positions, texels);
-                }
-            }
-        },
-    );
-    for (group, classes) in class.chunks(CLASSES).enumerate() {
-        if !classes.iter().fold(false, |any, class| any | (*class == CellClass::Broken)) {
-            continue;
-        }
-        let cells = (group * CLASSES..).zip(classes);
-        for (cell, _) in cells.filter(|(_, class)| **class == CellClass::Broken) {
-            let pixels = frame.map.x.pixels_of(cell);
-            let first = frame.valid.x + pixels.start as u32;
-            let p = [first, frame.valid.y + index_y].map(|p| (p << 8).cast_signed());
-            broken_cell(frame, color, [cell as u32, cell_y], p, &mut row[pixels]);
-        }
+    // Taken and put back, as a closure given to the thread's storage is not made for AVX2.
+    let mut scratch = ROW.take();
+    scratch.cells.update(frame, index_y);
+    scratch.broken.update(frame, index_y);
+    let mut rest = 0;
+    for (block, texels) in (0..).zip(row.chunks_mut(BLOCK)) {
+        let first = block * BLOCK as u32;
+        let broken = scratch.broken.take(&mut rest, first + texels.len() as u32);
+        gather_block(frame, color, &scratch.cells, broken, [first, index_y], texels);
     }
+    ROW.set(scratch);
 }
 
-impl Frame<'_> {
+/// The pixels from `index` of the valid rectangle on, at most [`BLOCK`]. `broken` are those among
+/// them that lie in broken cells: column, and where they are read.
+#[inline(always)]
+fn gather_block<T: Texel>(
+    frame: &Frame<'_>,
+    color: &Plane<T>,
+    cells: &RowCells,
+    broken: impl ExactSizeIterator<Item = (u32, [i32; 2])>,
+    index: [u32; 2],
+    texels: &mut [T],
+) {
+    let positions = cells.positions(frame, index, texels.len());
+    if broken.len() == 0 && !cells.is_finer {
+        if let Some([dx, dy]) = cells.shared(frame, index[0], texels.len()) {
+            let [p_x, p_y] = frame.centre(index);
+            sample_run(color, frame.valid, [p_x - dx, p_y - dy], texels);
+        } else {
+            T::sample_each(color, frame.valid, &positions, texels);
+        }
+        return;
+    }
+    let (mut xs, mut ys) = ([0; BLOCK], [0; BLOCK]);
+    let (xs, ys) = (&mut xs[..texels.len()], &mut ys[..texels.len()]);
+    positions.list(xs, ys);
+    for (column, place) in broken {
+        let i = (column - index[0]) as usize;
+        [xs[i], ys[i]] = place;
+    }
+    T::sample_each(color, frame.valid, &Listed { xs, ys }, texels);
+}
+
+impl<'a> Frame<'a> {
+    /// # Panics
+    /// If the planes of `field` are not of the size that `map` is of.
+    fn new(field: &'a LinearScratch, map: &'a FieldMap, valid: Rect, phase: Phase) -> Self {
+        let cells = [map.x.cells(), map.y.cells()];
+        let size = |width, height| [width, height] == cells;
+        let source = &field.source;
+        let has_size = size(source.depth.width(), source.depth.height())
+            && size(source.velocity.width(), source.velocity.height());
+        assert!(has_size, "the key's field has {cells:?} cells");
+        Self { field, map, valid, phase, one_cell: one_cell(map) }
+    }
+
+    /// Centre of a pixel that is counted from the top left of the valid rectangle, Q8.
+    #[inline(always)]
+    pub(super) fn centre(&self, [column, row]: [u32; 2]) -> [i32; 2] {
+        [self.valid.x + column, self.valid.y + row].map(|p| (p << 8).cast_signed())
+    }
+
     /// The surface that the key shows at the pixel nearest to `q`; None outside.
     #[inline(always)]
     pub(super) fn surface_at(&self, q: [i32; 2]) -> Option<Surface> {
-        let (surface, is_inside) = self.surface_near(q);
-        is_inside.then_some(surface)
-    }
-
-    /// The surface that the key shows at the pixel of the valid rectangle nearest to `q`, and
-    /// whether `q` lies on that pixel.
-    #[inline(always)]
-    pub(super) fn surface_near(&self, q: [i32; 2]) -> (Surface, bool) {
-        let x = ((q[0] + 128) >> 8) - self.valid.x.cast_signed();
-        let y = ((q[1] + 128) >> 8) - self.valid.y.cast_signed();
-        let last = [self.valid.width, self.valid.height].map(|length| length.cast_signed() - 1);
-        let inside = [x.clamp(0, last[0]), y.clamp(0, last[1])];
-        let [column, row] = inside.map(i32::cast_unsigned);
+        // Left of or above the rectangle the difference wraps and is larger than any size.
+        let column = (((q[0] + 128) >> 8) - self.valid.x.cast_signed()).cast_unsigned();
+        let row = (((q[1] + 128) >> 8) - self.valid.y.cast_signed()).cast_unsigned();
+        if column >= self.valid.width || row >= self.valid.height {
+            return None;
+        }
         let source = &self.field.source;
         let (cell_x, cell_y) = (self.map.x.cell_of(column), self.map.y.cell_of(row));
         let cell = cell_y as usize * source.depth.width() as usize + cell_x as usize;
-        let surface =
-            Surface { depth: source.depth.data()[cell], velocity: source.velocity.data()[cell] };
-        (surface, inside == [x, y])
+        Some(Surface { depth: source.depth.data()[cell], velocity: source.velocity.data()[cell] })
     }
 }

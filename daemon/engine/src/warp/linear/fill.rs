@@ -1,31 +1,22 @@
 //! What a hole shows: (3) and (4) of [`super`].
 
 use super::cpu::Frame;
-use crate::color::Texel;
 use crate::fill::far_side::NO_CELL;
-use crate::plane::Plane;
 use crate::warp::displacement;
-use crate::warp::sample::sample;
 use crate::warp::scatter::{NO_SOURCE, source_of};
 
-/// The colour of pixel centre `p` of the hole at `cell` of the field grid.
-pub(super) fn hole_pixel<T: Texel>(
-    frame: &Frame<'_>,
-    color: &Plane<T>,
-    cell: [u32; 2],
-    p: [i32; 2],
-) -> T {
+/// Where in the key pixel centre `p` of the hole at `cell` of the field grid is read.
+#[cold]
+pub(super) fn hole_place(frame: &Frame<'_>, cell: [u32; 2], p: [i32; 2]) -> [i32; 2] {
     let splat = &frame.field.splat;
-    let Some(far) = far_cell(frame, cell) else {
-        return sample(color, frame.valid, p[0], p[1]);
-    };
+    let Some(far) = far_cell(frame, cell) else { return p };
     let source = source_of(splat.data()[far as usize]);
     let depth = frame.field.source.depth.data()[source];
     let [dx, dy] = displacement(frame.field.source.velocity.data()[source], frame.phase);
     // (3)
     let q = clamp(frame, [p[0] - dx, p[1] - dy]);
     if is_far(frame, q, depth) {
-        return read(frame, color, q, depth);
+        return far_place(frame, q, depth);
     }
     // (4)
     let (width, map) = (splat.width(), frame.map);
@@ -37,12 +28,11 @@ pub(super) fn hole_pixel<T: Texel>(
     ];
     let q = clamp(frame, [edge[0] - dx, edge[1] - dy]);
     if is_far(frame, q, depth) {
-        return read(frame, color, q, depth);
+        return far_place(frame, q, depth);
     }
     let source = u32::try_from(source).expect("a source has 25 bits");
     let q = [map.x.centre(source % width), map.y.centre(source / width)];
-    let [x, y] = clamp(frame, q).map(|q| (q + 128) & !0xff);
-    sample(color, frame.valid, x, y)
+    nearest_pixel(clamp(frame, q))
 }
 
 /// The cell that a hole pixel continues: the far side of its own cell if that is a hole, else the
@@ -80,12 +70,14 @@ fn is_far(frame: &Frame<'_>, q: [i32; 2], depth: u32) -> bool {
     frame.surface_at(q).is_some_and(|near| near.depth - (near.depth >> 8) <= depth)
 }
 
-/// The key at `q`, between pixels only where all of them are far, else at the nearest one, which
-/// is.
-fn read<T: Texel>(frame: &Frame<'_>, color: &Plane<T>, q: [i32; 2], depth: u32) -> T {
+/// `q` itself where all the pixels around it are far, else the nearest one, which is.
+fn far_place(frame: &Frame<'_>, q: [i32; 2], depth: u32) -> [i32; 2] {
     let [x, y] = q.map(|q| q & !0xff);
     let corners = [[x, y], [x + 256, y], [x, y + 256], [x + 256, y + 256]];
     let mixes_near = corners.into_iter().any(|corner| !is_far(frame, clamp(frame, corner), depth));
-    let [x, y] = if mixes_near { q.map(|q| (q + 128) & !0xff) } else { q };
-    sample(color, frame.valid, x, y)
+    if mixes_near { nearest_pixel(q) } else { q }
+}
+
+fn nearest_pixel(q: [i32; 2]) -> [i32; 2] {
+    q.map(|q| (q + 128) & !0xff)
 }

@@ -8,7 +8,7 @@ use crate::key::{KeyFrame, Velocity};
 use crate::phase::Phase;
 use crate::plane::Plane;
 use crate::warp::resolve::{CellClass, classify, resolve};
-use crate::warp::scatter::{NO_SOURCE, SourceField, scatter};
+use crate::warp::scatter::{NO_SOURCE, ScatterScratch, SourceField, scatter};
 
 /// Planes on the field grid, all of its size. Their contents hold for one key and one phase.
 #[derive(Clone, Debug, Default)]
@@ -21,7 +21,7 @@ pub struct LinearScratch {
     pub(super) class: Plane<CellClass>,
     /// For each hole, the cell on its far side.
     pub(super) far: Plane<u32>,
-    top: Plane<u32>,
+    scatter: ScatterScratch,
     sides: FarScratch,
 }
 
@@ -44,7 +44,7 @@ impl LinearScratch {
 
     /// Scatters the field to `phase` and resolves it.
     pub(super) fn resolve(&mut self, pool: &ThreadPool, map: &FieldMap, phase: Phase) {
-        scatter(pool, &self.source, map, phase, &mut self.top, &mut self.splat);
+        scatter(pool, &self.source, map, phase, &mut self.scatter, &mut self.splat);
         resolve(pool, &self.source, &self.splat, &mut self.carried);
         if self.splat.data().contains(&NO_SOURCE) {
             far_side(pool, &self.source, &self.splat, &mut self.sides, &mut self.far);

@@ -19,17 +19,18 @@
 //! number [`MAX_CELLS`] cells. [`NO_SOURCE`] marks a hole. Cells that land outside are dropped.
 //! Exactness: `Exact`.
 
-mod cpu;
 mod gpu;
-mod runs;
+mod one_by_one;
 mod source;
 #[cfg(test)]
 mod tests;
+mod tiles;
+mod window;
 
-pub use cpu::scatter as scatter_one_by_one;
 pub use gpu::{SCATTER, SOURCE};
-pub use runs::scatter;
+pub use one_by_one::scatter as scatter_one_by_one;
 pub use source::SourceField;
+pub use tiles::{ScatterScratch, scatter};
 
 use crate::field::FieldAxis;
 use crate::phase::Phase;

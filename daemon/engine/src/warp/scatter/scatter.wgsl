@@ -1,4 +1,4 @@
-// Forward splat on the field grid in two passes, the twin of `cpu.rs`. Which invocation comes first
+// Forward splat on the field grid in two passes, the twin of `one_by_one.rs`. Which invocation comes first
 // does not matter: the largest depth key and the smallest candidate are the same in any order.
 
 @group(0) @binding(1) var<storage, read> held: array<u32>;

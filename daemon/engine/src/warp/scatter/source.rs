@@ -2,7 +2,7 @@
 
 use rayon::ThreadPool;
 
-use crate::bands::{for_each_row, for_each_row_of_two};
+use crate::bands::for_each_row;
 use crate::key::{KeyFrame, Velocity};
 use crate::plane::Plane;
 use crate::trajectory::dilate_motion::dilate_depth_row;
@@ -14,19 +14,18 @@ pub struct SourceField {
     pub velocity: Plane<Velocity>,
     /// Depth key of the surface that the velocity is of.
     pub depth: Plane<u32>,
-    /// How each row moves, in one column.
-    pub(super) reach: Plane<Reach>,
+    /// How each tile of cells moves.
+    pub(super) bounds: Plane<Bounds>,
 }
 
-/// How the cells of a row move.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Reach {
-    /// Smallest downward velocity.
-    pub(super) slowest: i16,
-    /// Largest downward velocity.
-    pub(super) fastest: i16,
-    /// Whether any cell moves, in whatever direction.
-    moves: bool,
+/// Columns and rows of a tile of cells.
+pub(super) const TILE: [u32; 2] = [32, 8];
+
+/// The velocities of a tile, right and down.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub(super) struct Bounds {
+    pub(super) low: [i16; 2],
+    pub(super) high: [i16; 2],
 }
 
 impl SourceField {
@@ -47,22 +46,17 @@ impl SourceField {
     /// Takes velocities on the grid of the key that was taken last.
     pub fn update_velocity(&mut self, pool: &ThreadPool, velocity: &Plane<Velocity>) {
         self.velocity.resize(velocity.width(), velocity.height());
-        self.reach.resize(1, velocity.height());
-        for_each_row_of_two(
+        for_each_row(
             pool,
             &mut self.velocity,
-            &mut self.reach,
             #[inline(always)]
-            |y, row, reach| {
-                let [mut slowest, mut fastest, mut moved] = [i16::MAX, i16::MIN, 0];
+            |y, row| {
                 for (held, &velocity) in row.iter_mut().zip(velocity.row(y)) {
                     *held = if velocity.is_trackable() { velocity } else { Velocity::default() };
-                    (slowest, fastest) = (slowest.min(held.y), fastest.max(held.y));
-                    moved |= held.x | held.y;
                 }
-                reach[0] = Reach { slowest, fastest, moves: moved != 0 };
             },
         );
+        self.bound(pool);
     }
 
     fn update_depth(&mut self, pool: &ThreadPool, key: &KeyFrame) {
@@ -83,9 +77,35 @@ impl SourceField {
             },
         );
     }
+
+    /// Bounds the velocities of each tile.
+    fn bound(&mut self, pool: &ThreadPool) {
+        let [tile_width, tile_height] = TILE;
+        let (width, height) = (self.velocity.width(), self.velocity.height());
+        self.bounds.resize(width.div_ceil(tile_width), height.div_ceil(tile_height));
+        let velocity = &self.velocity;
+        for_each_row(
+            pool,
+            &mut self.bounds,
+            #[inline(always)]
+            |y, bounds| {
+                bounds.fill(Bounds { low: [i16::MAX; 2], high: [i16::MIN; 2] });
+                for y in y * tile_height..((y + 1) * tile_height).min(height) {
+                    let tiles = velocity.row(y).chunks(tile_width as usize);
+                    for (Bounds { low, high }, tile) in bounds.iter_mut().zip(tiles) {
+                        for &Velocity { x, y } in tile {
+                            *low = [low[0].min(x), low[1].min(y)];
+                            *high = [high[0].max(x), high[1].max(y)];
+                        }
+                    }
+                }
+            },
+        );
+    }
+
     /// Whether no cell moves: then every frame is the key as it is.
     #[must_use]
     pub fn is_still(&self) -> bool {
-        !self.reach.data().iter().any(|row| row.moves)
+        self.bounds.data().iter().all(|bounds| *bounds == Bounds::default())
     }
 }

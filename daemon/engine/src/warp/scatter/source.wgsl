@@ -1,4 +1,4 @@
-// What the scatter reads of a key, the twin of `SourceField` in `cpu.rs`: velocities with 0 where
+// What the scatter reads of a key, the twin of `source.rs`: velocities with 0 where
 // none is known, and the depth of the surface that each velocity is of.
 
 @group(0) @binding(1) var<storage, read> velocity: array<u32>;

@@ -49,7 +49,7 @@ proptest! {
         threads in 1_usize..5,
     ) {
         let steps = reach * 64 + 1;
-        // Patches of one velocity, some of them wide enough to be splatted as runs.
+        // Patches of one velocity, some of them wider than a tile.
         let v = |x, y, axis| (hash(x / patch, y, seed.wrapping_add(axis)) % steps) as i16 - (reach * 32) as i16;
         // Few depths, some within the tolerance of each other.
         let depth = plane(width, height, |x, y| 100_000 + 300 * (hash(x, y, seed) % levels));
@@ -59,8 +59,8 @@ proptest! {
         let (pool, map, phase) = (pool(threads), map_of(&key), Phase::from_f64(phase));
         let mut source = SourceField::default();
         source.update(&pool, &key);
-        let (mut top, mut splat) = (Plane::default(), Plane::default());
-        scatter(&pool, &source, &map, phase, &mut top, &mut splat);
+        let mut splat = Plane::default();
+        scatter(&pool, &source, &map, phase, &mut ScatterScratch::default(), &mut splat);
         prop_assert_eq!(splat, by_definition(&source, [phase.q12(); 2]));
     }
 }
@@ -69,7 +69,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
     #[test]
-    fn runs_of_cells_are_splatted_like_cells_one_by_one(
+    fn tiles_are_splatted_like_cells_one_by_one(
         (width, height) in (1_u32..700, 1_u32..6),
         (shear, patch) in (0_i32..40, 1_u32..300),
         levels in 1_u32..4,
@@ -90,8 +90,42 @@ proptest! {
         source.update(&pool, &key);
         let [mut top, mut splat, mut expected] = [(); 3].map(|()| Plane::default());
         scatter_one_by_one(&source, &map, phase, &mut top, &mut expected);
-        scatter(&pool, &source, &map, phase, &mut top, &mut splat);
+        scatter(&pool, &source, &map, phase, &mut ScatterScratch::default(), &mut splat);
         prop_assert_eq!(splat, expected);
+    }
+}
+
+/// A key of noise, in patches that move by up to `reach` pixels each way.
+fn patches(size: [u32; 2], patch: u32, reach: u32) -> KeyFrame {
+    let v = |x: u32, y: u32, axis| {
+        let steps = hash(x / patch, y / patch, axis) % (reach * 64 + 1);
+        (steps.cast_signed() - (reach * 32).cast_signed()) as i16
+    };
+    let depth = plane(size[0], size[1], |x, y| 100_000 + 300 * (hash(x, y, 5) % 4));
+    let velocity = plane(size[0], size[1], |x, y| Velocity { x: v(x, y, 1), y: v(x, y, 2) });
+    KeyFrame { valid: Rect::full(size[0], size[1]), depth, velocity, ..KeyFrame::default() }
+}
+
+#[test]
+fn far_and_near_movers_are_splatted_like_cells_one_by_one_whatever_it_costs() {
+    // Windows of a few cells, windows too wide to look through, and no windows at all.
+    for (reach, are_windows, are_wide) in [(1, true, false), (60, true, true), (1000, false, true)]
+    {
+        let key = patches([800, 300], 24, reach);
+        let (pool, map) = (pool(2), map_of(&key));
+        let mut source = SourceField::default();
+        source.update(&pool, &key);
+        let mut scratch = ScatterScratch::default();
+        assert_eq!(
+            scratch.note_windows(&source, [Phase::ONE.q12(); 2]),
+            are_windows,
+            "windows, {reach}"
+        );
+        assert_eq!(scratch.has_wide_window(), are_wide, "{reach}");
+        let [mut top, mut splat, mut expected] = [(); 3].map(|()| Plane::default());
+        scatter_one_by_one(&source, &map, Phase::ONE, &mut top, &mut expected);
+        scatter(&pool, &source, &map, Phase::ONE, &mut scratch, &mut splat);
+        assert!(splat == expected, "patches that move by up to {reach} pixels");
     }
 }
 
@@ -103,13 +137,13 @@ fn a_cell_between_columns_reaches_both_and_one_on_a_column_reaches_one() {
     let (pool, map) = (pool(1), map_of(&key));
     let mut source = SourceField::default();
     source.update(&pool, &key);
-    let (mut top, mut splat) = (Plane::default(), Plane::default());
+    let (mut scratch, mut splat) = (ScatterScratch::default(), Plane::default());
     let landed = |splat: &Plane<u32>| -> Vec<usize> {
         (0..8).filter(|x| splat.data()[*x] != NO_SOURCE).collect()
     };
-    scatter(&pool, &source, &map, Phase::ONE, &mut top, &mut splat);
+    scatter(&pool, &source, &map, Phase::ONE, &mut scratch, &mut splat);
     assert_eq!(landed(&splat), [3, 4], "one and a half cells on");
-    scatter(&pool, &source, &map, Phase::from_f64(2.0), &mut top, &mut splat);
+    scatter(&pool, &source, &map, Phase::from_f64(2.0), &mut scratch, &mut splat);
     assert_eq!(landed(&splat), [5], "three cells on");
     assert_eq!(source_of(splat.data()[5]), 2);
 }

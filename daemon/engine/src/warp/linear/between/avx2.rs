@@ -5,15 +5,16 @@
 //! caller asks the processor whether it has AVX2.
 
 use std::arch::x86_64::{
-    __m256i, _mm256_add_epi32, _mm256_and_si256, _mm256_loadu_si256, _mm256_mullo_epi32,
-    _mm256_permutevar8x32_epi32, _mm256_set1_epi32, _mm256_setr_epi32, _mm256_slli_epi32,
+    __m256i, _mm256_add_epi32, _mm256_and_si256, _mm256_andnot_si256, _mm256_loadu_si256,
+    _mm256_madd_epi16, _mm256_permutevar8x32_epi32, _mm256_set1_epi32, _mm256_setr_epi32,
     _mm256_srai_epi32, _mm256_srli_epi32, _mm256_storeu_si256, _mm256_sub_epi32,
 };
 
 use super::{LANES, RowPositions};
 
 /// Displacements of the cells of two rows at `phase`, Q12, interpolated `way` of the way from the
-/// first to the second, into `moved`, as many as whole steps hold; returns their number.
+/// first to the second, into `xs` and `ys`, as many as whole steps hold; returns their number.
+/// Those that differ by 2^15 or more from row to row come out as anything.
 ///
 /// # Panics
 /// If the rows are not of one length, or `moved` is shorter.
@@ -25,10 +26,13 @@ pub(super) fn interpolate(
     way: i32,
     [xs, ys]: [&mut [i32]; 2],
 ) -> usize {
-    let [phase, way] = [phase, way].map(|factor| _mm256_set1_epi32(factor));
-    let half = _mm256_set1_epi32(256);
-    let moved =
-        |v: __m256i| _mm256_srai_epi32(_mm256_add_epi32(_mm256_mullo_epi32(v, phase), half), 9);
+    let (low, way) = (_mm256_set1_epi32(0xffff), _mm256_set1_epi32(way));
+    // A phase is at most 16384: products of 16 bits hold it.
+    let phase = _mm256_set1_epi32(phase | phase << 16);
+    let moved = |v: __m256i| {
+        let product = _mm256_madd_epi16(v, phase);
+        _mm256_srai_epi32(_mm256_add_epi32(product, _mm256_set1_epi32(256)), 9)
+    };
     let [above, below] = rows.map(|row| row.as_chunks::<LANES>().0);
     assert_eq!(above.len(), below.len(), "rows of one length");
     let (xs, ys) = (xs.as_chunks_mut::<LANES>().0, ys.as_chunks_mut::<LANES>().0);
@@ -36,13 +40,8 @@ pub(super) fn interpolate(
     for (i, (above, below)) in above.iter().zip(below).enumerate() {
         // SAFETY: each holds 8 times two values of 16 bits, and the loads need no alignment.
         let rows = [above, below].map(|row| unsafe { _mm256_loadu_si256(row.as_ptr().cast()) });
-        let lerp = |[above, below]: [__m256i; 2]| {
-            let part = _mm256_mullo_epi32(_mm256_sub_epi32(below, above), way);
-            let part = _mm256_srai_epi32(_mm256_add_epi32(part, _mm256_set1_epi32(128)), 8);
-            _mm256_add_epi32(above, part)
-        };
-        let x = lerp(rows.map(|v| moved(_mm256_srai_epi32(_mm256_slli_epi32(v, 16), 16))));
-        let y = lerp(rows.map(|v| moved(_mm256_srai_epi32(v, 16))));
+        let x = lerp(rows.map(|v| moved(_mm256_and_si256(v, low))), way);
+        let y = lerp(rows.map(|v| moved(_mm256_andnot_si256(low, v))), way);
         // SAFETY: both hold 8 values of 32 bits, and the stores need no alignment.
         unsafe {
             _mm256_storeu_si256(xs[i].as_mut_ptr().cast(), x);
@@ -50,6 +49,15 @@ pub(super) fn interpolate(
         }
     }
     above.len() * LANES
+}
+
+/// [`super::lerp`] of eight, where `a` and `b` differ by less than 2^15.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn lerp([a, b]: [__m256i; 2], way: __m256i) -> __m256i {
+    // The low half of the difference times the way, the high half times 0.
+    let part = _mm256_madd_epi16(_mm256_sub_epi32(b, a), way);
+    _mm256_add_epi32(a, _mm256_srai_epi32(_mm256_add_epi32(part, _mm256_set1_epi32(128)), 8))
 }
 
 /// Where eight pixels from `i` on are read. Grids have at most as many cells as pixels.
@@ -79,9 +87,7 @@ pub(super) fn positions(row: &RowPositions<'_>, i: usize) -> [__m256i; 2] {
         };
         let left = _mm256_permutevar8x32_epi32(left, cell);
         let right = _mm256_permutevar8x32_epi32(right, cell);
-        let part = _mm256_mullo_epi32(_mm256_sub_epi32(right, left), way);
-        let part = _mm256_srai_epi32(_mm256_add_epi32(part, _mm256_set1_epi32(128)), 8);
-        _mm256_add_epi32(left, part)
+        lerp([left, right], way)
     };
     let steps = _mm256_setr_epi32(0, 0x100, 0x200, 0x300, 0x400, 0x500, 0x600, 0x700);
     let x = _mm256_add_epi32(_mm256_set1_epi32(row.p[0] + ((i as i32) << 8)), steps);
@@ -89,6 +95,23 @@ pub(super) fn positions(row: &RowPositions<'_>, i: usize) -> [__m256i; 2] {
         _mm256_sub_epi32(x, displacement(row.xs)),
         _mm256_sub_epi32(_mm256_set1_epi32(row.p[1]), displacement(row.ys)),
     ]
+}
+
+/// Where the pixels are read, into `xs` and `ys`, as many as whole steps hold; returns their
+/// number.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) fn list(row: &RowPositions<'_>, xs: &mut [i32], ys: &mut [i32]) -> usize {
+    let (xs, ys) = (xs.as_chunks_mut::<LANES>().0, ys.as_chunks_mut::<LANES>().0);
+    for (i, (eight_xs, eight_ys)) in xs.iter_mut().zip(ys).enumerate() {
+        let [x, y] = positions(row, i * LANES);
+        // SAFETY: both hold 8 values of 32 bits, and the stores need no alignment.
+        unsafe {
+            _mm256_storeu_si256(eight_xs.as_mut_ptr().cast(), x);
+            _mm256_storeu_si256(eight_ys.as_mut_ptr().cast(), y);
+        }
+    }
+    xs.len() * LANES
 }
 
 #[cfg(test)]
@@ -105,8 +128,11 @@ mod tests {
             return;
         }
         for case in 0..2000 {
-            let displacement =
-                |i: usize, axis| (hash(case, i as u32, axis) >> 11) as i32 - 0x10_0000;
+            // Anywhere, and neighbours as far apart as products of 16 bits allow.
+            let displacement = |i: usize, axis| {
+                let middle = (hash(case, 0, axis) >> 11) as i32 - 0x10_0000;
+                middle + (hash(case, i as u32, axis) >> 17) as i32
+            };
             let [xs, ys] = [0, 1]
                 .map(|axis| (0..2 * PIXELS + 8).map(|i| displacement(i, axis)).collect::<Vec<_>>());
             let first = (hash(case, 0, 2) % 64) as usize;
@@ -114,7 +140,8 @@ mod tests {
                 let cell = first + i * (case as usize % 8) / 7;
                 [cell as u16, (hash(case, i as u32, 3) & 0xff) as u16]
             });
-            let row = RowPositions { xs: &xs, ys: &ys, places: &places, p: [700, -30] };
+            let row =
+                RowPositions { xs: &xs, ys: &ys, places: &places, p: [700, -30], is_finer: false };
             for i in 0..=PIXELS - LANES {
                 // SAFETY: the processor has AVX2, asked for above.
                 let together = unsafe { positions(&row, i) };

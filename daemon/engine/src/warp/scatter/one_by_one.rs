@@ -36,25 +36,37 @@ pub fn scatter(
 /// source cell lands.
 fn for_each_splat(source: &SourceField, scale: [i32; 2], mut splat: impl FnMut(usize, u32, u32)) {
     let (width, height) = (source.velocity.width(), source.velocity.height());
-    for y in 0..height {
-        for x in 0..width {
-            let velocity = source.velocity.at(x, y);
-            let depth = source.depth.at(x, y);
-            let target = [
-                (x << 8).cast_signed() + shift(velocity.x, scale[0]),
-                (y << 8).cast_signed() + shift(velocity.y, scale[1]),
-            ];
-            for [right, down] in [[0, 0], [1, 0], [0, 1], [1, 1]] {
-                let cell = [(target[0] >> 8) + right, (target[1] >> 8) + down];
-                let away = [0, 1].map(|axis| (target[axis] - (cell[axis] << 8)).unsigned_abs());
-                let inside = (0..width.cast_signed()).contains(&cell[0])
-                    && (0..height.cast_signed()).contains(&cell[1]);
-                if inside && away[0] < 256 && away[1] < 256 {
-                    let cell = cell[1] as usize * width as usize + cell[0] as usize;
-                    let candidate = ((away[0] + away[1]) >> 2 << SOURCE_BITS) | (y * width + x);
-                    splat(cell, depth, candidate);
-                }
+    for cell in (0..height).flat_map(|y| (0..width).map(move |x| [x, y])) {
+        for_each_corner(source, scale, cell, |x, y, depth, candidate| {
+            if x < width && y < height {
+                splat(y as usize * width as usize + x as usize, depth, candidate);
             }
+        });
+    }
+}
+
+/// Calls `splat(column, row, depth key, candidate of (3))` for the 2x2 cells around where source
+/// cell (`x`, `y`) lands, which may lie outside the grid: above and left of it numbers wrap.
+#[inline(always)]
+pub(super) fn for_each_corner(
+    source: &SourceField,
+    scale: [i32; 2],
+    [x, y]: [u32; 2],
+    mut splat: impl FnMut(u32, u32, u32, u32),
+) {
+    let velocity = source.velocity.at(x, y);
+    let depth = source.depth.at(x, y);
+    let target = [
+        (x << 8).cast_signed() + shift(velocity.x, scale[0]),
+        (y << 8).cast_signed() + shift(velocity.y, scale[1]),
+    ];
+    for [right, down] in [[0, 0], [1, 0], [0, 1], [1, 1]] {
+        let cell = [(target[0] >> 8) + right, (target[1] >> 8) + down];
+        let away = [0, 1].map(|axis| (target[axis] - (cell[axis] << 8)).unsigned_abs());
+        if away[0] < 256 && away[1] < 256 {
+            let candidate =
+                ((away[0] + away[1]) >> 2 << SOURCE_BITS) | (y * source.velocity.width() + x);
+            splat(cell[0].cast_unsigned(), cell[1].cast_unsigned(), depth, candidate);
         }
     }
 }
