@@ -11,6 +11,8 @@ pub struct Shader {
     pub file: &'static str,
     /// Its text: what it shares with others, then the file.
     pub parts: &'static [&'static str],
+    /// Buffers whose every byte is 0 when it begins.
+    pub cleared: &'static [Slot],
     /// What is bound from slot 1 on, in order; slot 0 has [`crate::params::FrameParams`].
     pub bindings: &'static [Binding],
     /// Its entry points, in order.
@@ -39,8 +41,10 @@ pub enum Extent {
     CellColumns,
     /// Each row of the field grid.
     CellRows,
-    /// Each cell that [`Slot::Broken`] lists; it begins with the groups of the dispatch.
-    BrokenCells,
+    /// Each [`STRIP`] rows of a column of the field grid.
+    CellStrips,
+    /// Each cell that the list in a buffer has; it begins with the groups of the dispatch.
+    Listed(Slot),
     /// Nothing: there is one alone.
     One,
     /// Each triangle of the mesh.
@@ -95,7 +99,7 @@ pub enum Slot {
     Carried,
     /// Source that a cell shows, or the far side of a hole.
     Origin,
-    /// Whether any cell is a hole.
+    /// The cells that are holes.
     Holes,
     /// Nearest resolved rows above and below a cell.
     StackedRows,
@@ -121,6 +125,9 @@ impl Slot {
     /// How many there are.
     pub const COUNT: usize = Self::Out as usize + 1;
 }
+
+/// Rows of [`Extent::CellStrips`].
+pub const STRIP: u32 = 4;
 
 /// Invocations of a workgroup over a plane.
 const TILE: [u32; 2] = [16, 16];

@@ -9,7 +9,7 @@ use naga::front::wgsl;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
 use super::*;
-use crate::backend::shader::{Binding, COLOR, COMMON, FIELD};
+use crate::backend::shader::{Binding, COLOR, COMMON, FIELD, STRIP};
 use crate::params::FrameParams;
 use crate::warp::grid::TRIANGLE_BYTES;
 
@@ -205,6 +205,7 @@ fn constants_of_the_shaders_are_those_of_the_cpu() {
     use crate::warp::grid::{FARTHEST, LANES};
     use crate::warp::resolve::HOLE;
     use crate::warp::scatter::{MAX_CELLS, NO_SOURCE, SOURCE_BITS};
+    assert_eq!(LINEAR.entries[1].workgroup, FAR_SIDE.entries[2].workgroup, "both go over lists");
     let hole = u32::from(HOLE.x.cast_unsigned()) | u32::from(HOLE.y.cast_unsigned()) << 16;
     let expected = [
         ("HOLE", i64::from(hole)),
@@ -212,7 +213,8 @@ fn constants_of_the_shaders_are_those_of_the_cpu() {
         ("NO_SOURCE", i64::from(NO_SOURCE)),
         ("NO_CELL", i64::from(NO_CELL)),
         ("NO_ROW", i64::from(NO_ROW)),
-        ("BROKEN_GROUP", i64::from(LINEAR.entries[1].workgroup[0])),
+        ("LIST_GROUP", i64::from(LINEAR.entries[1].workgroup[0])),
+        ("STRIP", i64::from(STRIP)),
         ("GROUPS_OF_A_ROW", 1024),
         ("NO_TRIANGLE", i64::from(u32::MAX)),
         ("LANES", i64::from(LANES)),

@@ -24,7 +24,7 @@ pub use device::Gpu;
 pub use error::GpuError;
 
 use super::FrameInput;
-use super::shader::{Extent, Shader, Slot};
+use super::shader::{Extent, STRIP, Shader, Slot};
 use crate::color::{ColorFormat, ColorPlane};
 use crate::field::FieldMap;
 use crate::fill::far_side::FAR_SIDE;
@@ -70,8 +70,8 @@ fn frame_shaders(method: Method) -> &'static [&'static Shader] {
     }
 }
 
-/// Words of [`Slot::Broken`] before the cells.
-const BROKEN_HEADER: u64 = 4;
+/// Words of a list of cells before the cells.
+const LIST_HEADER: u64 = 4;
 
 /// A shader of a method, ready to run.
 type Step = (&'static Shader, Arc<Compiled>);
@@ -200,8 +200,7 @@ impl GpuBackend {
         for (shader, _) in self.key_steps.iter().chain(&self.frame_steps) {
             for slot in shader.bindings.iter().map(|binding| binding.slot()) {
                 let size = match slot {
-                    Slot::Holes => 4,
-                    Slot::Broken => 4 * (BROKEN_HEADER + area(params.cells)),
+                    Slot::Holes | Slot::Broken => 4 * (LIST_HEADER + area(params.cells)),
                     Slot::Held
                     | Slot::Near
                     | Slot::Top
@@ -266,6 +265,9 @@ fn dispatch(
     params: &FrameParams,
 ) -> Result<(), GpuError> {
     for (shader, compiled) in steps {
+        for slot in shader.cleared {
+            commands.clear_buffer(planes.held(*slot)?, 0, None);
+        }
         let group = planes.bind(gpu, shader, &compiled.layout)?;
         let mut pass = commands.begin_compute_pass(&Default::default());
         pass.set_bind_group(0, &group, &[]);
@@ -276,9 +278,10 @@ fn dispatch(
                 Extent::CellColumns => [params.cells[0], 1],
                 Extent::CellRows => [params.cells[1], 1],
                 Extent::One => [1, 1],
-                Extent::BrokenCells => {
+                Extent::CellStrips => [params.cells[0], params.cells[1].div_ceil(STRIP)],
+                Extent::Listed(slot) => {
                     pass.set_pipeline(pipeline);
-                    pass.dispatch_workgroups_indirect(planes.held(Slot::Broken)?, 0);
+                    pass.dispatch_workgroups_indirect(planes.held(slot)?, 0);
                     continue;
                 }
                 Extent::Triangles => [2 * params.mesh_cells[0], params.mesh_cells[1]],

@@ -223,6 +223,26 @@ fn every_adapter_warps_a_picture_8192_pixels_wide() {
     }
 }
 
+/// Planes of up to 8 bytes a pixel, each in one binding: lavapipe binds 128 MiB.
+#[test]
+fn every_adapter_warps_a_picture_of_4096x2160() {
+    for gpu in test_gpus("every_adapter_warps_a_picture_of_4096x2160") {
+        // Few edges: a device has to answer in time.
+        let patch = |x, y| hash(x / 128, y / 120, 1);
+        let depth = plane(2048, 1080, patch);
+        let velocity = plane(2048, 1080, |x, y| {
+            let steps = patch(x, y);
+            Velocity { x: (steps % 999) as i16 - 500, y: (steps >> 16) as i16 % 500 }
+        });
+        let key = key(noise(ColorFormat::Rgba16f, 4096, 2160, 4), depth, velocity);
+        let phase = Phase::from_f64(0.37);
+        let made = on_gpu(&gpu, Method::Linear, &[&key], std::iter::once(phase));
+        let expected = on_cpu(Method::Linear, &[&key], phase);
+        assert_eq!(difference(&made[0], &expected), None, "on {}", gpu.name());
+        assert_ne!(difference(&key.color, &expected), None, "something moved");
+    }
+}
+
 #[test]
 fn every_adapter_blends_as_the_cpu_does() {
     for gpu in test_gpus("every_adapter_blends_as_the_cpu_does") {

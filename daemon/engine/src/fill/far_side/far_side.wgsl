@@ -8,14 +8,14 @@
 @group(0) @binding(3) var<storage, read_write> stacked_rows: array<u32>;
 // Nearest resolved column left and right of each cell.
 @group(0) @binding(4) var<storage, read_write> beside_columns: array<u32>;
-@group(0) @binding(5) var<storage, read> holes: array<u32>;
+@group(0) @binding(5) var<storage, read> holes: ListedCells;
 
 // No resolved row or column on this side.
 const NO_ROW: u32 = 0xffffu;
 
 @compute @workgroup_size(64, 1)
 fn sweep_columns(@builtin(global_invocation_id) id: vec3<u32>) {
-    if holes[0] == 0u || id.x >= params.cells.x {
+    if holes.count == 0u || id.x >= params.cells.x {
         return;
     }
     var above = NO_ROW;
@@ -34,7 +34,7 @@ fn sweep_columns(@builtin(global_invocation_id) id: vec3<u32>) {
 
 @compute @workgroup_size(64, 1)
 fn sweep_rows(@builtin(global_invocation_id) id: vec3<u32>) {
-    if holes[0] == 0u || id.x >= params.cells.y {
+    if holes.count == 0u || id.x >= params.cells.y {
         return;
     }
     var left = NO_ROW;
@@ -111,17 +111,14 @@ fn farther(first: Side, second: Side) -> Side {
     return first;
 }
 
-@compute @workgroup_size(16, 16)
+@compute @workgroup_size(64, 1)
 fn far_side(@builtin(global_invocation_id) id: vec3<u32>) {
-    let hole = id.xy;
-    if holes[0] == 0u || !is_inside(hole, params.cells) {
+    let place = place_in_list(id);
+    if place >= holes.count {
         return;
     }
-    let i = cell_index(hole);
-    // A hole is its own nearest row nowhere, a resolved cell is.
-    if (stacked_rows[i] & 0xffffu) == hole.y {
-        return;
-    }
+    let i = holes.cells[place];
+    let hole = vec2<u32>(i % params.cells.x, i / params.cells.x);
     let stacked = Sides(
         vertical(hole, stacked_rows[i] & 0xffffu), vertical(hole, stacked_rows[i] >> 16u),
     );

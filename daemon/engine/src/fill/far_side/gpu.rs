@@ -6,6 +6,7 @@ use crate::backend::shader::{Binding, COMMON, Entry, Extent, Shader, Slot};
 pub const FAR_SIDE: Shader = Shader {
     file: "far_side.wgsl",
     parts: &[COMMON, include_str!("far_side.wgsl")],
+    cleared: &[],
     bindings: &[
         Binding::Write(Slot::Origin),
         Binding::Read(Slot::Near),
@@ -16,6 +17,6 @@ pub const FAR_SIDE: Shader = Shader {
     entries: &[
         Entry::lines("sweep_columns", Extent::CellColumns),
         Entry::lines("sweep_rows", Extent::CellRows),
-        Entry::tiles("far_side", Extent::Cells),
+        Entry::lines("far_side", Extent::Listed(Slot::Holes)),
     ],
 };

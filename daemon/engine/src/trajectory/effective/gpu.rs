@@ -6,6 +6,7 @@ use crate::backend::shader::{Binding, COMMON, Entry, Extent, Shader, Slot};
 pub const EFFECTIVE: Shader = Shader {
     file: "effective.wgsl",
     parts: &[COMMON, include_str!("effective.wgsl")],
+    cleared: &[],
     bindings: &[
         Binding::Read(Slot::Velocity),
         Binding::Read(Slot::Acceleration),

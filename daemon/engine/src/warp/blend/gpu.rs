@@ -6,6 +6,7 @@ use crate::backend::shader::{Binding, COLOR, COMMON, Entry, Extent, Shader, Slot
 pub const BLEND: Shader = Shader {
     file: "blend.wgsl",
     parts: &[COMMON, COLOR, include_str!("blend.wgsl")],
+    cleared: &[],
     bindings: &[Binding::Read(Slot::Color), Binding::Read(Slot::Older), Binding::Write(Slot::Out)],
     entries: &[Entry::tiles("blend", Extent::Pixels)],
 };

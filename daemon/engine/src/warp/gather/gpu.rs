@@ -6,6 +6,7 @@ use crate::backend::shader::{Binding, COLOR, COMMON, Entry, Extent, FIELD, Shade
 pub const GATHER: Shader = Shader {
     file: "gather.wgsl",
     parts: &[COMMON, FIELD, COLOR, include_str!("gather.wgsl")],
+    cleared: &[],
     bindings: &[
         Binding::Read(Slot::Color),
         Binding::Read(Slot::Velocity),

@@ -14,6 +14,7 @@ pub const LANES: u32 = 8;
 pub const GRID: Shader = Shader {
     file: "grid.wgsl",
     parts: &[COMMON, COLOR, include_str!("grid.wgsl")],
+    cleared: &[],
     bindings: &[
         Binding::Read(Slot::Color),
         Binding::Read(Slot::Vertices),

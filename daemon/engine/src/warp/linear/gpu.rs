@@ -6,6 +6,7 @@ use crate::backend::shader::{Binding, COLOR, COMMON, Entry, Extent, FIELD, Shade
 pub const LINEAR: Shader = Shader {
     file: "linear.wgsl",
     parts: &[COMMON, FIELD, COLOR, include_str!("linear.wgsl")],
+    cleared: &[],
     bindings: &[
         Binding::Read(Slot::Color),
         Binding::Read(Slot::Held),
@@ -18,6 +19,6 @@ pub const LINEAR: Shader = Shader {
     ],
     entries: &[
         Entry::tiles("warp_linear", Extent::Pixels),
-        Entry::lines("warp_broken", Extent::BrokenCells),
+        Entry::lines("warp_broken", Extent::Listed(Slot::Broken)),
     ],
 };

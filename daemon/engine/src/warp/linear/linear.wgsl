@@ -8,7 +8,7 @@
 // Of the cells of this frame: velocity, source or far side of a hole, and which are broken.
 @group(0) @binding(4) var<storage, read> carried: array<u32>;
 @group(0) @binding(5) var<storage, read> origin: array<u32>;
-@group(0) @binding(6) var<storage, read> broken: array<u32>;
+@group(0) @binding(6) var<storage, read> broken: ListedCells;
 @group(0) @binding(7) var<storage, read> tables: array<u32>;
 @group(0) @binding(8) var<storage, read_write> out: array<u32>;
 
@@ -31,11 +31,11 @@ fn warp_linear(@builtin(global_invocation_id) id: vec3<u32>) {
 // An invocation for each broken cell.
 @compute @workgroup_size(64, 1)
 fn warp_broken(@builtin(global_invocation_id) id: vec3<u32>) {
-    let place = id.y * GROUPS_OF_A_ROW * BROKEN_GROUP + id.x;
-    if place >= broken[3] {
+    let place = place_in_list(id);
+    if place >= broken.count {
         return;
     }
-    let i = broken[4u + place];
+    let i = broken.cells[place];
     let cell = vec2<u32>(i % params.cells.x, i / params.cells.x);
     let pixels = pixels_of(cell);
     for (var y = pixels.first.y; y < pixels.end.y; y++) {

@@ -2,42 +2,54 @@
 // `cpu.rs`.
 
 @group(0) @binding(1) var<storage, read> carried: array<u32>;
-// The groups of a dispatch over the broken cells (3), their number, and from word 4 on the cells.
-@group(0) @binding(2) var<storage, read_write> broken: array<atomic<u32>>;
+@group(0) @binding(2) var<storage, read_write> broken: CellList;
 
 const LOWEST: i32 = -32768;
+// Rows of cells that an invocation goes down, keeping what neighbours share.
+const STRIP: u32 = 4u;
+
+struct Range {
+    low: vec2<i32>,
+    high: vec2<i32>,
+}
+
+// Of the velocities of three cells beside each other, two at the edges.
+fn range_of_row(x: u32, y: u32) -> Range {
+    let left = velocity_of(carried[cell_index(vec2<u32>(max(x, 1u) - 1u, y))]);
+    let middle = velocity_of(carried[cell_index(vec2<u32>(x, y))]);
+    let right = velocity_of(carried[cell_index(vec2<u32>(min(x + 1u, params.cells.x - 1u), y))]);
+    return Range(min(min(left, middle), right), max(max(left, middle), right));
+}
 
 @compute @workgroup_size(16, 16)
 fn classify(@builtin(global_invocation_id) id: vec3<u32>) {
-    let cell = id.xy;
-    if !is_inside(cell, params.cells) {
+    let first = id.y * STRIP;
+    if id.x >= params.cells.x || first >= params.cells.y {
         return;
     }
-    let first = max(cell, vec2<u32>(1u)) - 1u;
-    let last = min(cell + 1u, params.cells - 1u);
-    var low = velocity_of(carried[cell_index(cell)]);
-    var high = low;
-    for (var y = first.y; y <= last.y; y++) {
-        for (var x = first.x; x <= last.x; x++) {
-            let v = velocity_of(carried[cell_index(vec2<u32>(x, y))]);
-            low = min(low, v);
-            high = max(high, v);
+    var above = range_of_row(id.x, max(first, 1u) - 1u);
+    var here = range_of_row(id.x, first);
+    for (var y = first; y < min(first + STRIP, params.cells.y); y++) {
+        let below = range_of_row(id.x, min(y + 1u, params.cells.y - 1u));
+        let low = min(min(above.low, here.low), below.low);
+        let high = max(max(above.high, here.high), below.high);
+        // (2). Only a hole has the lowest velocity.
+        let ranges = vec2<u32>(high - low);
+        let agrees = (low != vec2<i32>(LOWEST)) & (ranges <= vec2<u32>(params.smooth_limit));
+        if !all(agrees) {
+            // In which order they are listed makes no difference to the picture.
+            broken.cells[atomicAdd(&broken.count, 1u)] = cell_index(vec2<u32>(id.x, y));
         }
-    }
-    // (2). Only a hole has the lowest velocity.
-    let ranges = vec2<u32>(high - low);
-    let agrees = (low != vec2<i32>(LOWEST)) & (ranges <= vec2<u32>(params.smooth_limit));
-    if !all(agrees) {
-        // In which order they are listed makes no difference to the picture.
-        let place = atomicAdd(&broken[3], 1u);
-        atomicStore(&broken[4u + place], cell_index(cell));
+        above = here;
+        here = below;
     }
 }
 
+// (3)
 @compute @workgroup_size(1, 1)
 fn count_groups() {
-    let groups = (atomicLoad(&broken[3]) + BROKEN_GROUP - 1u) / BROKEN_GROUP;
-    atomicStore(&broken[0], min(groups, GROUPS_OF_A_ROW));
-    atomicStore(&broken[1], (groups + GROUPS_OF_A_ROW - 1u) / GROUPS_OF_A_ROW);
-    atomicStore(&broken[2], 1u);
+    let groups = groups_of(atomicLoad(&broken.count));
+    broken.columns = groups.x;
+    broken.rows = groups.y;
+    broken.layers = 1u;
 }

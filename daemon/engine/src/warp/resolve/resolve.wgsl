@@ -4,7 +4,7 @@
 @group(0) @binding(2) var<storage, read> splat: array<u32>;
 @group(0) @binding(3) var<storage, read_write> carried: array<u32>;
 @group(0) @binding(4) var<storage, read_write> origin: array<u32>;
-@group(0) @binding(5) var<storage, read_write> holes: array<u32>;
+@group(0) @binding(5) var<storage, read_write> holes: CellList;
 
 @compute @workgroup_size(16, 16)
 fn resolve(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -12,15 +12,28 @@ fn resolve(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let i = cell_index(id.xy);
+    let candidate = ~splat[i];
     // (1)
-    if splat[i] == NO_SOURCE {
+    if candidate == NO_SOURCE {
         carried[i] = HOLE;
         origin[i] = NO_CELL;
-        // Every invocation that writes, writes the same.
-        holes[0] = 1u;
+        list(i);
         return;
     }
-    let source = splat[i] & MAX_CELLS;
+    let source = candidate & MAX_CELLS;
     carried[i] = held[source];
     origin[i] = source;
+}
+
+// In which order cells are listed makes no difference to the picture.
+fn list(i: u32) {
+    holes.cells[atomicAdd(&holes.count, 1u)] = i;
+}
+
+@compute @workgroup_size(1, 1)
+fn count_groups() {
+    let groups = groups_of(atomicLoad(&holes.count));
+    holes.columns = groups.x;
+    holes.rows = groups.y;
+    holes.layers = 1u;
 }

@@ -6,6 +6,7 @@ use crate::backend::shader::{Binding, COMMON, Entry, Extent, Shader, Slot};
 pub const SOURCE: Shader = Shader {
     file: "source.wgsl",
     parts: &[COMMON, include_str!("source.wgsl")],
+    cleared: &[],
     bindings: &[
         Binding::Read(Slot::Velocity),
         Binding::Read(Slot::Depth),
@@ -19,16 +20,14 @@ pub const SOURCE: Shader = Shader {
 pub const SCATTER: Shader = Shader {
     file: "scatter.wgsl",
     parts: &[COMMON, include_str!("scatter.wgsl")],
+    cleared: &[Slot::Top, Slot::Splat],
     bindings: &[
         Binding::Read(Slot::Held),
         Binding::Read(Slot::Near),
         Binding::Write(Slot::Top),
         Binding::Write(Slot::Splat),
-        Binding::Write(Slot::Holes),
-        Binding::Write(Slot::Broken),
     ],
     entries: &[
-        Entry::tiles("clear", Extent::Cells),
         Entry::tiles("scatter_top", Extent::Cells),
         Entry::tiles("scatter_splat", Extent::Cells),
     ],

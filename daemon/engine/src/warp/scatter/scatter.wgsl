@@ -1,26 +1,11 @@
 // Forward splat on the field grid in two passes, the twin of `one_by_one.rs`. Which invocation comes first
 // does not matter: the largest depth key and the smallest candidate are the same in any order.
+// Candidates are kept with every bit turned over, so that cleared memory is `NO_SOURCE`.
 
 @group(0) @binding(1) var<storage, read> held: array<u32>;
 @group(0) @binding(2) var<storage, read> near: array<u32>;
 @group(0) @binding(3) var<storage, read_write> top: array<atomic<u32>>;
 @group(0) @binding(4) var<storage, read_write> splat: array<atomic<u32>>;
-@group(0) @binding(5) var<storage, read_write> holes: array<u32>;
-@group(0) @binding(6) var<storage, read_write> broken: array<u32>;
-
-@compute @workgroup_size(16, 16)
-fn clear(@builtin(global_invocation_id) id: vec3<u32>) {
-    if !is_inside(id.xy, params.cells) {
-        return;
-    }
-    let i = cell_index(id.xy);
-    atomicStore(&top[i], 0u);
-    atomicStore(&splat[i], NO_SOURCE);
-    if i == 0u {
-        holes[0] = 0u;
-        broken[3] = 0u;
-    }
-}
 
 // Where a source cell lands: the target cell left of and above it, and the way there in 1/256.
 struct Landing {
@@ -78,7 +63,7 @@ fn scatter_splat(@builtin(global_invocation_id) id: vec3<u32>) {
             let ways = select(land.way, 256u - land.way, step == vec2<u32>(1u));
             let distance = (ways.x + ways.y) >> 2u;
             // (3)
-            atomicMin(&splat[i], (distance << SOURCE_BITS) | source);
+            atomicMax(&splat[i], ~((distance << SOURCE_BITS) | source));
         }
     }
 }
