@@ -20,10 +20,21 @@ pub fn for_each_row<T: Send>(
     row: impl Fn(u32, &mut [T]) + Sync,
 ) {
     let width = plane.width() as usize;
-    for_each_chunk(pool, plane.data_mut(), width, row);
+    for_each_chunk(
+        pool,
+        plane.data_mut(),
+        MIN_ROWS * width,
+        #[inline(always)]
+        |chunk, rows| {
+            for (y, pixels) in (chunk * MIN_ROWS as u32..).zip(rows.chunks_mut(width)) {
+                row(y, pixels);
+            }
+        },
+    );
 }
 
-/// Calls `chunk(i, part)` for every `i`-th run of `length` elements of `data`.
+/// Calls `chunk(i, part)` for every `i`-th run of `length` elements of `data`, which is enough for
+/// a thread to wake up for.
 #[expect(clippy::cast_possible_truncation, reason = "planes have at most 8192 rows")]
 pub fn for_each_chunk<T: Send>(
     pool: &ThreadPool,
@@ -34,23 +45,17 @@ pub fn for_each_chunk<T: Send>(
     if length == 0 {
         return;
     }
-    if pool.current_num_threads() == 1 || data.len() <= MIN_ROWS * length {
-        for (y, part) in data.chunks_mut(length).enumerate() {
-            widest(
-                #[inline(always)]
-                || chunk(y as u32, part),
-            );
-        }
-        return;
+    let chunk = |(i, part): (usize, &mut [T])| {
+        widest(
+            #[inline(always)]
+            || chunk(i as u32, part),
+        );
+    };
+    if pool.current_num_threads() == 1 || data.len() <= length {
+        data.chunks_mut(length).enumerate().for_each(chunk);
+    } else {
+        pool.install(|| data.par_chunks_mut(length).enumerate().for_each(chunk));
     }
-    pool.install(|| {
-        data.par_chunks_mut(length).enumerate().with_min_len(MIN_ROWS).for_each(|(y, part)| {
-            widest(
-                #[inline(always)]
-                || chunk(y as u32, part),
-            );
-        });
-    });
 }
 
 /// Calls `row(y, row of a, row of b)` for every row of two planes of the same height.

@@ -1,6 +1,6 @@
 //! Key frames: as they arrive ([`KeyInput`]) and as the engine keeps them ([`KeyFrame`]).
 
-use zerocopy::{Immutable, IntoBytes};
+use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 use crate::color::ColorPlane;
 use crate::plane::{Plane, Rect};
@@ -59,8 +59,8 @@ pub struct KeyInput<'a> {
 
 /// Velocity of one surface point, in 1/32 pixel of the colour plane per motion span: position at
 /// the key minus position at `motion_from`. [`Velocity::UNTRACKABLE`] holds no velocity.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, IntoBytes, Immutable)]
-#[repr(C)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, FromBytes, IntoBytes, Immutable)]
+#[repr(C, align(4))]
 pub struct Velocity {
     /// To the right.
     pub x: i16,

@@ -10,7 +10,6 @@ pub mod info;
 pub mod man;
 pub mod pacing;
 pub mod perception;
-mod plot;
 pub mod replay;
 pub mod scenes;
 pub mod score;

@@ -244,6 +244,3 @@ impl Mean {
         (self.count > 0).then(|| self.sum / f64::from(self.count))
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -40,9 +40,15 @@ pub fn far_side(
             let mut left = None;
             let mut x = 0;
             while x < width {
-                if splats[x as usize] != NO_SOURCE {
-                    left = Some(x);
-                    x += 1;
+                let rest = &splats[x as usize..];
+                if rest[0] != NO_SOURCE {
+                    // A whole group at once, or one cell.
+                    let has_hole = |group: &&[u32; GROUP]| {
+                        group.iter().fold(false, |any, splat| any | (*splat == NO_SOURCE))
+                    };
+                    let group = rest.first_chunk().filter(|group| !has_hole(group));
+                    x += group.map_or(1, |group| group.len() as u32);
+                    left = Some(x - 1);
                     continue;
                 }
                 let run = splats[x as usize..].iter().take_while(|splat| **splat == NO_SOURCE);

@@ -1,12 +1,17 @@
 //! The reference of [`super`].
 
+use std::cell::RefCell;
+
 use foreframe_perception::tracking::tracked_share;
 use rayon::ThreadPool;
 
 use super::{DilateParams, MAX_DISPLACEMENT_PX};
-use crate::bands::for_each_row;
+use crate::bands::{for_each_chunk, for_each_row};
 use crate::key::Velocity;
 use crate::plane::Plane;
+
+/// Rows that share what is known of the rows between them.
+const BAND_ROWS: usize = 32;
 
 /// Dilates and quantises `displacement`. `depth` has its size or is empty.
 pub fn dilate_motion(
@@ -21,45 +26,121 @@ pub fn dilate_motion(
     let px_per_span = params
         .pixels_per_degree
         .map(|pixels_per_degree| pixels_per_degree * params.span.as_secs_f64() as f32);
-    for_each_row(
+    if depth.data().is_empty() {
+        for_each_row(
+            pool,
+            velocity,
+            #[inline(always)]
+            |y, row| quantise_row(displacement.row(y), px_per_span, row),
+        );
+        return;
+    }
+    let width = velocity.width() as usize;
+    let last = displacement.height() - 1;
+    for_each_chunk(
         pool,
-        velocity,
+        velocity.data_mut(),
+        BAND_ROWS * width,
         #[inline(always)]
-        |y, row| {
-            let cells = row.iter_mut().zip(displacement.row(y));
-            // A loop of its own without damping, which has no call in it.
-            if px_per_span.is_none() {
-                for (velocity, &displacement) in cells {
-                    *velocity = quantise(displacement, None);
+        |band, velocities| {
+            // Taken and put back, as a closure given to the thread's storage is not made for AVX2.
+            let mut rows = ROWS.take();
+            let first = band * BAND_ROWS as u32;
+            let mut next = first.saturating_sub(1);
+            for (y, velocities) in (first..).zip(velocities.chunks_mut(width)) {
+                let around = [y.saturating_sub(1), y, (y + 1).min(last)];
+                for y in next..=around[2] {
+                    rows[y as usize % 3].update(depth.row(y), displacement.row(y), px_per_span);
                 }
-            } else {
-                for (velocity, &displacement) in cells {
-                    *velocity = quantise(displacement, px_per_span);
-                }
+                next = around[2] + 1;
+                dilate_row(depth.row(y), around.map(|y| &rows[y as usize % 3]), velocities);
             }
-            if depth.data().is_empty() {
-                return;
-            }
-            for_each_block(depth, y, |first, near| {
-                let centres = &depth.row(y)[first as usize..][..near.len()];
-                for (step, (near, centres)) in
-                    near.chunks(STEP).zip(centres.chunks(STEP)).enumerate()
-                {
-                    if near == centres {
-                        continue;
-                    }
-                    let first = first + (step * STEP) as u32;
-                    for (x, (&near, &centre)) in (first..).zip(near.iter().zip(centres)) {
-                        if near != centre {
-                            let (column, row_of) = nearest_in_3x3(depth, x, y, near);
-                            let nearer = displacement.at(column, row_of);
-                            row[x as usize] = quantise(nearer, px_per_span);
-                        }
-                    }
-                }
-            });
+            ROWS.set(rows);
         },
     );
+}
+
+thread_local! {
+    /// Row `y` is at `y % 3`. Kept from band to band.
+    static ROWS: RefCell<[RowMaxima; 3]> = RefCell::default();
+}
+
+/// The nearest of each three neighbouring cells of a row.
+#[derive(Debug, Default)]
+struct RowMaxima {
+    /// Velocity of each cell itself.
+    own: Vec<Velocity>,
+    /// Depth key of the nearest, the leftmost among equals.
+    depth: Vec<u32>,
+    /// Its velocity, as a word: what a wide register chooses between.
+    word: Vec<u32>,
+}
+
+impl RowMaxima {
+    #[inline(always)]
+    fn update(&mut self, depth: &[u32], displacement: &[[f32; 2]], px_per_span: Option<f32>) {
+        let Self { own, depth: max, word } = self;
+        max.resize(depth.len(), 0);
+        word.resize(depth.len(), 0);
+        own.resize(depth.len(), Velocity::default());
+        quantise_row(displacement, px_per_span, own);
+        let last = depth.len() - 1;
+        let cell = |x: usize| (depth[x], zerocopy::transmute!(own[x]));
+        // Beyond the border there is nothing: depth 0 is never nearer.
+        let none = (0, 0);
+        for x in [0, last] {
+            let left = if x > 0 { cell(x - 1) } else { none };
+            let right = if x < last { cell(x + 1) } else { none };
+            (max[x], word[x]) = nearest(left, cell(x), right);
+        }
+        let cells = max[1..].iter_mut().zip(&mut word[1..]);
+        for ((max, word), (depth, own)) in cells.zip(depth.windows(3).zip(own.windows(3))) {
+            let [left, here, right] = [0, 1, 2].map(|i| (depth[i], zerocopy::transmute!(own[i])));
+            (*max, *word) = nearest(left, here, right);
+        }
+    }
+}
+
+/// The one of largest depth key, the first among equals.
+#[inline(always)]
+fn nearest(first: (u32, u32), second: (u32, u32), third: (u32, u32)) -> (u32, u32) {
+    let nearer = |a: (u32, u32), b: (u32, u32)| {
+        let takes_second = b.0 > a.0;
+        (if takes_second { b.0 } else { a.0 }, if takes_second { b.1 } else { a.1 })
+    };
+    nearer(nearer(first, second), third)
+}
+
+/// (1) and (2) for a row of cells with depth keys `centres`, between the row above and the one
+/// below, which are the row itself at the border.
+#[inline(always)]
+fn dilate_row(centres: &[u32], [above, here, below]: [&RowMaxima; 3], velocities: &mut [Velocity]) {
+    let [above_cells, here_cells, below_cells] =
+        [above, here, below].map(|row| row.depth.iter().zip(&row.word));
+    let cells = above_cells.zip(here_cells).zip(below_cells).zip(centres.iter().zip(&here.own));
+    for (velocity, (((above, here), below), (&centre, &own))) in velocities.iter_mut().zip(cells) {
+        let pair = |(depth, word): (&u32, &u32)| (*depth, *word);
+        let (max, word) = nearest(pair(above), pair(here), pair(below));
+        let own: u32 = zerocopy::transmute!(own);
+        let takes_nearest = max - centre > max >> 8;
+        *velocity = zerocopy::transmute!(if takes_nearest { word } else { own });
+    }
+}
+
+/// (3) and (4) for a row.
+#[inline(always)]
+fn quantise_row(displacement: &[[f32; 2]], px_per_span: Option<f32>, row: &mut [Velocity]) {
+    let cells = row.iter_mut().zip(displacement);
+    // A loop of its own without damping, which has no call in it.
+    if px_per_span.is_none() {
+        for (velocity, &displacement) in cells {
+            *velocity = quantise(displacement, None);
+        }
+    } else {
+        for (velocity, &displacement) in cells {
+            *velocity = quantise(displacement, px_per_span);
+        }
+    }
 }
 
 /// Copies to each cell of `to` what the cell of `from` that it takes its motion from holds, (2).
@@ -104,8 +185,6 @@ pub fn dilate_depth_row(depth: &Plane<u32>, y: u32, dilated: &mut [u32]) {
 
 /// Cells whose maxima are computed together.
 const BLOCK: usize = 64;
-/// Cells that are skipped together where none takes another's motion.
-const STEP: usize = 8;
 
 /// Calls `block(first, keys)` with the depth keys of (2) for each run of cells of row `y`.
 #[inline(always)]

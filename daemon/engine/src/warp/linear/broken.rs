@@ -7,7 +7,7 @@
 mod avx2;
 
 use super::cpu::Frame;
-use super::fill::hole_place;
+use super::fill::{FarSurface, far_surface, hole_place};
 use crate::key::Velocity;
 #[cfg(target_arch = "x86_64")]
 use crate::simd::has_avx2;
@@ -49,16 +49,18 @@ impl BrokenRow {
         if self.pixels.is_empty() {
             return;
         }
-        let mut done = 0;
         #[cfg(target_arch = "x86_64")]
         if has_avx2() {
             // SAFETY: the processor has AVX2, asked for just above.
-            done = unsafe { avx2::places(frame, index_y, &self.pixels, &mut self.places) };
+            unsafe { avx2::places(frame, index_y, &self.pixels, &mut self.places) };
+            return;
         }
-        for &[column, cell] in &self.pixels[done..] {
-            let p = frame.centre([u32::from(column), index_y]);
-            let cell = [u32::from(cell), frame.map.y.cell_of(index_y)];
-            self.places.push(place(frame, cell, p).unwrap_or_else(|| hole_place(frame, cell, p)));
+        let mut holes = Holes::new(frame, index_y);
+        for &pixel in &self.pixels {
+            let [column, cell] = pixel.map(u32::from);
+            let p = frame.centre([column, index_y]);
+            let found = place(frame, [cell, holes.cell_y], p);
+            self.places.push(found.unwrap_or_else(|| holes.place(pixel)));
         }
     }
 
@@ -76,6 +78,31 @@ impl BrokenRow {
         *rest += count;
         let places = &self.places[from..*rest];
         pixels[..count].iter().zip(places).map(|([column, _], place)| (u32::from(*column), *place))
+    }
+}
+
+/// The holes of a row, from left to right.
+struct Holes<'a> {
+    frame: &'a Frame<'a>,
+    index_y: u32,
+    cell_y: u32,
+    /// The cell that was looked at last, and what its holes continue.
+    last: Option<(u16, Option<FarSurface>)>,
+}
+
+impl<'a> Holes<'a> {
+    fn new(frame: &'a Frame<'a>, index_y: u32) -> Self {
+        Self { frame, index_y, cell_y: frame.map.y.cell_of(index_y), last: None }
+    }
+
+    /// Where the pixel in `column` and `cell`, to which no candidate comes, is read.
+    fn place(&mut self, [column, cell]: [u16; 2]) -> [i32; 2] {
+        let far = match self.last {
+            Some((last, far)) if last == cell => far,
+            _ => far_surface(self.frame, [u32::from(cell), self.cell_y]),
+        };
+        self.last = Some((cell, far));
+        hole_place(self.frame, far, self.frame.centre([u32::from(column), self.index_y]))
     }
 }
 

@@ -5,32 +5,48 @@ use crate::fill::far_side::NO_CELL;
 use crate::warp::displacement;
 use crate::warp::scatter::{NO_SOURCE, source_of};
 
-/// Where in the key pixel centre `p` of the hole at `cell` of the field grid is read.
-#[cold]
-pub(super) fn hole_place(frame: &Frame<'_>, cell: [u32; 2], p: [i32; 2]) -> [i32; 2] {
-    let splat = &frame.field.splat;
-    let Some(far) = far_cell(frame, cell) else { return p };
-    let source = source_of(splat.data()[far as usize]);
-    let depth = frame.field.source.depth.data()[source];
-    let [dx, dy] = displacement(frame.field.source.velocity.data()[source], frame.phase);
+/// The surface that the holes of a cell continue.
+#[derive(Clone, Copy)]
+pub(super) struct FarSurface {
+    /// The cell, and the source that it shows.
+    cell: u32,
+    source: u32,
+    depth: u32,
+    displacement: [i32; 2],
+}
+
+/// The surface that holes in `cell` continue; None where nothing is resolved.
+pub(super) fn far_surface(frame: &Frame<'_>, cell: [u32; 2]) -> Option<FarSurface> {
+    let cell = far_cell(frame, cell)?;
+    let source = source_of(frame.field.splat.data()[cell as usize]);
+    Some(FarSurface {
+        cell,
+        source: u32::try_from(source).expect("a source has 25 bits"),
+        depth: frame.field.source.depth.data()[source],
+        displacement: displacement(frame.field.source.velocity.data()[source], frame.phase),
+    })
+}
+
+/// Where in the key pixel centre `p` of a hole is read.
+pub(super) fn hole_place(frame: &Frame<'_>, far: Option<FarSurface>, p: [i32; 2]) -> [i32; 2] {
+    let Some(FarSurface { cell, source, depth, displacement: [dx, dy] }) = far else { return p };
     // (3)
     let q = clamp(frame, [p[0] - dx, p[1] - dy]);
     if is_far(frame, q, depth) {
         return far_place(frame, q, depth);
     }
     // (4)
-    let (width, map) = (splat.width(), frame.map);
+    let (width, map) = (frame.field.splat.width(), frame.map);
     let within = |p: i32, centre: i32, cell_px: i32| p.clamp(centre - cell_px, centre + cell_px);
     let half = frame.one_cell >> 1;
     let edge = [
-        within(p[0], map.x.centre(far % width), half),
-        within(p[1], map.y.centre(far / width), half),
+        within(p[0], map.x.centre(cell % width), half),
+        within(p[1], map.y.centre(cell / width), half),
     ];
     let q = clamp(frame, [edge[0] - dx, edge[1] - dy]);
     if is_far(frame, q, depth) {
         return far_place(frame, q, depth);
     }
-    let source = u32::try_from(source).expect("a source has 25 bits");
     let q = [map.x.centre(source % width), map.y.centre(source / width)];
     nearest_pixel(clamp(frame, q))
 }

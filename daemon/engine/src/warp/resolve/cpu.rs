@@ -2,10 +2,14 @@
 
 use rayon::ThreadPool;
 
+#[cfg(target_arch = "x86_64")]
+use super::avx2;
 use super::{CellClass, HOLE};
 use crate::bands::for_each_row;
 use crate::phase::Phase;
 use crate::plane::Plane;
+#[cfg(target_arch = "x86_64")]
+use crate::simd::has_avx2;
 use crate::warp::scatter::{NO_SOURCE, SourceField, source_of};
 
 /// Largest difference of displacement in a smooth neighbourhood, Q8 pixels. Half a pixel: a
@@ -26,7 +30,14 @@ pub fn resolve(
         carried,
         #[inline(always)]
         |y, row| {
-            for (velocity, &splat) in row.iter_mut().zip(splat.row(y)) {
+            let splats = splat.row(y);
+            let mut done = 0;
+            #[cfg(target_arch = "x86_64")]
+            if has_avx2() {
+                // SAFETY: the processor has AVX2, asked for just above.
+                done = unsafe { avx2::resolve(velocities, splats, row) };
+            }
+            for (velocity, &splat) in row.iter_mut().zip(splats).skip(done) {
                 let shown = if splat == NO_SOURCE { HOLE } else { velocities[source_of(splat)] };
                 *velocity = [shown.x, shown.y];
             }

@@ -11,6 +11,8 @@
 //! are, they move together. Only broken cells pay for choosing. Neighbours outside the grid do not
 //! take part. Exactness: `Exact`.
 
+#[cfg(target_arch = "x86_64")]
+mod avx2;
 mod cpu;
 mod gpu;
 

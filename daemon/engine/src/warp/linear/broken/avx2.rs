@@ -12,12 +12,11 @@ use std::arch::x86_64::{
     _mm256_slli_epi32, _mm256_srai_epi32, _mm256_srli_epi32, _mm256_sub_epi32,
 };
 
-use super::NEIGHBOURS;
+use super::{Holes, NEIGHBOURS};
 use crate::field::FieldAxis;
 use crate::key::Velocity;
 use crate::plane::Plane;
 use crate::warp::linear::cpu::Frame;
-use crate::warp::linear::fill::hole_place;
 use crate::warp::resolve::HOLE;
 
 /// Pixels of one step.
@@ -40,34 +39,30 @@ struct Judged {
     rank: __m256i,
 }
 
-/// Where `pixels` (column and cell) of row `index_y` are read, appended to `places`, as many as
-/// whole steps hold, returns their number.
+/// Where `pixels` (column and cell) of row `index_y` are read, appended to `places`.
 #[target_feature(enable = "avx2")]
 pub(super) fn places(
     frame: &Frame<'_>,
     index_y: u32,
     pixels: &[[u16; 2]],
     places: &mut Vec<[i32; 2]>,
-) -> usize {
-    let cell_y = frame.map.y.cell_of(index_y);
+) {
+    let mut holes = Holes::new(frame, index_y);
+    let cell_y = holes.cell_y;
     let last_row = frame.field.carried.height() - 1;
     let rows = [cell_y.saturating_sub(1), cell_y, (cell_y + 1).min(last_row)];
-    let (eights, _) = pixels.as_chunks::<LANES>();
-    for eight in eights {
-        let (xs, ys, found) = eight_places(frame, index_y, rows, eight);
-        for (i, [column, cell]) in eight.iter().enumerate() {
+    for pixels in pixels.chunks(LANES) {
+        // Places that are left over take the first pixel once more.
+        let mut eight = [pixels[0]; LANES];
+        eight[..pixels.len()].copy_from_slice(pixels);
+        let (xs, ys, found) = eight_places(frame, index_y, rows, &eight);
+        for (i, pixel) in pixels.iter().enumerate() {
             // SAFETY: both members are 32 bytes that any value may have.
             let (place, found) =
                 unsafe { ([xs.lanes[i], ys.lanes[i]], found.lanes[i].cast_unsigned()) };
-            places.push(if found == u32::MAX {
-                let p = frame.centre([u32::from(*column), index_y]);
-                hole_place(frame, [u32::from(*cell), cell_y], p)
-            } else {
-                place
-            });
+            places.push(if found == u32::MAX { holes.place(*pixel) } else { place });
         }
     }
-    eights.len() * LANES
 }
 
 /// Where eight pixels are read, x and y, and the smallest rank of each, all ones where no

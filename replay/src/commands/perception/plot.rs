@@ -8,14 +8,14 @@ use anyhow::Context as _;
 use crate::draw::Drawing;
 
 /// Reads the name of a plot: it ends in `.svg` or `.png`.
-pub(crate) fn parse_plot(text: &str) -> Result<PathBuf, String> {
+pub(super) fn parse_plot(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     let is_known = path.extension().is_some_and(|ending| ending == "svg" || ending == "png");
     if is_known { Ok(path) } else { Err(format!("expected FILE.svg or FILE.png, found `{text}`")) }
 }
 
 /// Writes a drawing in the form that the name asks for.
-pub(crate) fn write(drawing: &Drawing, path: &Path) -> anyhow::Result<()> {
+pub(super) fn write(drawing: &Drawing, path: &Path) -> anyhow::Result<()> {
     let writing = || format!("writing {}", path.display());
     if path.extension().is_some_and(|ending| ending == "svg") {
         return fs::write(path, drawing.to_svg()).with_context(writing);
