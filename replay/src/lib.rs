@@ -10,6 +10,7 @@ pub mod commands;
 pub mod demo;
 pub mod draw;
 pub mod exr_frames;
+pub mod html;
 pub mod options;
 pub mod output;
 pub mod pictures;

@@ -1,4 +1,8 @@
 //! A daemon in the same thread, driven step by step: it answers what a test tells it to.
+//!
+//! The tests of the demonstration client use it, too.
+
+#![allow(dead_code, reason = "each test program uses its own part")]
 
 use std::time::Duration;
 
@@ -7,8 +11,9 @@ use foreframe_protocol::limits::MAX_POOL_BYTES;
 use foreframe_protocol::memory::ReadOnlyPool;
 use foreframe_protocol::socket::{Channel, Received, Sent};
 use foreframe_protocol::{
-    Body, ClientMessage, Clock, Features, GpuKind, Packet, PoolAccepted, ReleaseReason,
-    SlotReleased, StreamCreated, Submit, Welcome,
+    Body, ClientMessage, Clock, CreateStream, Features, GpuKind, Packet, PlaneDescriptor,
+    PlaneKind, PoolAccepted, RegisterPool, ReleaseReason, SlotReleased, StreamCreated, Submit,
+    Welcome,
 };
 
 /// Long enough to mean that something is wrong when it is used up.
@@ -17,6 +22,8 @@ pub(crate) const PATIENCE: Duration = Duration::from_secs(20);
 pub(crate) struct FakeDaemon {
     pub(crate) channel: Channel,
     pub(crate) pool: Option<ReadOnlyPool>,
+    /// Of the stream that was accepted last.
+    pub(crate) stream: Option<(CreateStream, RegisterPool)>,
 }
 
 pub(crate) fn welcome() -> Welcome {
@@ -42,7 +49,7 @@ pub(crate) fn welcome() -> Welcome {
 /// A client whose handshake is done, and the daemon at its other end.
 pub(crate) fn connect() -> (Client, FakeDaemon) {
     let (ours, theirs) = Channel::pair().expect("a pair of sockets");
-    let mut daemon = FakeDaemon { channel: theirs, pool: None };
+    let mut daemon = FakeDaemon { channel: theirs, pool: None, stream: None };
     let connecting = ConnectOptions::new("test").start_over(ours).expect("a hello is sent");
     let Handshake::Pending(connecting) = connecting.dispatch().expect("no answer yet") else {
         panic!("the daemon has not answered");
@@ -89,14 +96,32 @@ impl FakeDaemon {
         };
         self.send(&StreamCreated { stream: create.stream, slots: create.slots });
         self.send(&PoolAccepted { stream: register.stream, pool: register.pool });
+        self.stream = Some((create, register));
         id
     }
 
     pub(crate) fn next_submit(&mut self) -> Submit {
-        match self.next() {
-            Some(ClientMessage::Submit(submit)) => submit,
+        self.submit_if_any().expect("a submit")
+    }
+
+    pub(crate) fn submit_if_any(&mut self) -> Option<Submit> {
+        match self.next()? {
+            ClientMessage::Submit(submit) => Some(submit),
             other => panic!("expected a submit, found {other:?}"),
         }
+    }
+
+    /// The bytes of a plane, row by row without padding.
+    pub(crate) fn plane(&self, submit: &Submit, kind: PlaneKind, pixel_bytes: u32) -> Vec<u8> {
+        let PlaneDescriptor { offset, stride, width, height, .. } =
+            *submit.planes.get(kind).expect("a plane that the stream declares");
+        let (_, register) = self.stream.as_ref().expect("a stream was accepted");
+        let offset = u64::from(submit.slot) * register.slot_bytes + offset;
+        let pool = self.pool.as_ref().expect("its pool came with it");
+        let mut bytes = Vec::new();
+        pool.copy_rows_to_vec(offset, stride, width * pixel_bytes, height, &mut bytes)
+            .expect("a plane inside its slot");
+        bytes
     }
 
     pub(crate) fn release(&self, submit: &Submit, reason: ReleaseReason) {

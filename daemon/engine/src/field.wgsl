@@ -1,6 +1,9 @@
 // The map between pixels and cells of the field grid, from the tables of `field.rs`:
 // one word per column of the valid rectangle, one per row; the centres of the cells' columns and of
-// their rows; the first pixels of both, and behind each the end. Expects a binding `tables`.
+// their rows; the first pixels of both, and behind each the end. Comes after `color.wgsl` and takes
+// binding 3: a shader's own begin at 4.
+
+@group(0) @binding(3) var<storage, read> tables: array<u32>;
 
 struct Place {
     // The cell that holds the pixel.

@@ -10,6 +10,7 @@ pub mod info;
 pub mod man;
 pub mod pacing;
 pub mod perception;
+mod plot;
 pub mod replay;
 pub mod scenes;
 pub mod score;

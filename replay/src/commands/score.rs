@@ -1,5 +1,6 @@
 //! `foreframe score`: how good each method's in-between frames are, on captures of a high rate.
 
+use std::fs;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -10,10 +11,13 @@ use foreframe_engine::backend::choice::BackendChoice;
 use foreframe_engine::backend::gpu::Gpu;
 use foreframed::{clock, gpu};
 
+use super::plot;
 use crate::options::{parse_count, parse_ratio};
 use crate::output::Output;
 use crate::recording::Recording as _;
 use crate::recording::capture::CaptureRecording;
+use crate::score::chart::chart;
+use crate::score::page::{frames_to_keep, page};
 use crate::score::report::Report;
 use crate::score::run::{ScoreOptions, score_recording};
 
@@ -29,12 +33,20 @@ pub struct Args {
     /// Methods to compare: names with commas between, or all.
     #[arg(long, value_name = "A,B", default_value = "all", value_parser = parse_methods)]
     pub methods: Methods,
-    /// What makes the frames, which does not change them: auto, cpu, gpu or gpu:NAME.
-    #[arg(long, default_value_t = BackendChoice::Cpu)]
-    pub backend: BackendChoice,
+    /// What makes the frames, which does not change them, with commas between: auto, cpu, gpu or
+    /// gpu:NAME.
+    #[arg(long, alias = "backend", value_name = "A,B", value_delimiter = ',')]
+    #[arg(default_value = "cpu")]
+    pub backends: Vec<BackendChoice>,
     /// Threads of the engine [default: as many as there are processors]
     #[arg(long, value_name = "N", value_parser = parse_count, allow_negative_numbers = true)]
     pub threads: Option<NonZeroUsize>,
+    /// Chart of speed against accuracy, FILE.svg or FILE.png.
+    #[arg(long, value_name = "FILE", value_parser = plot::parse_plot)]
+    pub chart: Option<PathBuf>,
+    /// Page with everything: chart, tables, error over time, pictures to flip through.
+    #[arg(long, value_name = "OUT.html")]
+    pub report: Option<PathBuf>,
 }
 
 /// Methods, each once.
@@ -49,9 +61,20 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
     let options = ScoreOptions {
         methods: args.methods.0.clone(),
         ratio: args.ratio,
-        gpu: gpu::open(&args.backend).context("--backend")?,
+        backends: args
+            .backends
+            .iter()
+            .map(|choice| gpu::open(choice).with_context(|| format!("--backends {choice}")))
+            .collect::<anyhow::Result<_>>()?,
         threads: args.threads.unwrap_or_else(all_processors),
         timer: clock::now,
+        kept_frames: match args.report {
+            Some(_) => {
+                let rows = args.methods.0.len() * args.backends.len();
+                frames_to_keep(args.captures.len(), rows)
+            }
+            None => 0,
+        },
     };
     let mut recordings = Vec::new();
     for path in &args.captures {
@@ -74,7 +97,16 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
     }
     progress.finish_and_clear();
     let report = Report::new(options.threads.get(), scores);
-    output.result(&report, &report.to_text())
+    let mut text = report.to_text();
+    if let Some(path) = &args.chart {
+        plot::write(&chart(&report)?, path)?;
+        text += &format!("\nthe chart is in {}\n", path.display());
+    }
+    if let Some(path) = &args.report {
+        fs::write(path, page(&report)?).with_context(|| format!("writing {}", path.display()))?;
+        text += &format!("\nthe page is in {}\n", path.display());
+    }
+    output.result(&report, &text)
 }
 
 /// What reports call the backend.

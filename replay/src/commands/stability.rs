@@ -1,12 +1,17 @@
 //! `foreframe stability`: where methods fail.
 
+use std::fs;
 use std::path::PathBuf;
 
+use anyhow::Context as _;
 use foreframe_engine::Method;
 use foreframe_fixtures::probes::PICTURE;
 
+use super::plot;
 use super::score::{Methods, parse_methods};
 use crate::output::Output;
+use crate::stability::page::page;
+use crate::stability::plot::plot as sweeps_chart;
 use crate::stability::report::Report;
 use crate::stability::run::run_sweep;
 use crate::stability::sweeps::{SWEEPS, Sweep};
@@ -28,9 +33,12 @@ pub struct Args {
     /// Methods to compare besides hold: names with commas between, or all
     #[arg(long, value_name = "A,B", default_value = "all", value_parser = parse_methods)]
     pub methods: Methods,
-    /// One small chart per sweep, as SVG or PNG
-    #[arg(long, value_name = "OUT.svg")]
+    /// One small chart per sweep, FILE.svg or FILE.png
+    #[arg(long, value_name = "FILE", value_parser = plot::parse_plot)]
     pub chart: Option<PathBuf>,
+    /// Page with the charts and all tables
+    #[arg(long, value_name = "OUT.html")]
+    pub report: Option<PathBuf>,
 }
 
 /// Sweeps, each once.
@@ -54,7 +62,16 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
     }
     progress.finish_and_clear();
     let report = Report::new(PICTURE.width, PICTURE.height, sweeps);
-    output.result(&report, &report.to_text())
+    let mut text = report.to_text();
+    if let Some(path) = &args.chart {
+        plot::write(&sweeps_chart(&report)?, path)?;
+        text += &format!("\nthe charts are in {}\n", path.display());
+    }
+    if let Some(path) = &args.report {
+        fs::write(path, page(&report)?).with_context(|| format!("writing {}", path.display()))?;
+        text += &format!("\nthe page is in {}\n", path.display());
+    }
+    output.result(&report, &text)
 }
 
 /// Sweeps by name, each once, in the order of the list; `all` for every one.

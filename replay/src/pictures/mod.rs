@@ -1,14 +1,19 @@
-//! The pictures that the tool leaves behind: a contact sheet, a timeline, charts.
+//! The pictures that the tool leaves behind: a contact sheet, a timeline, charts, small
+//! multiples, stacked columns.
 //!
 //! Pure functions from plain structs to a [`tiny_skia::Pixmap`], which encodes itself as PNG. They
 //! read no file and no clock, and know nothing of how the frames were made.
 
 mod chart;
+mod columns;
 mod contact_sheet;
+mod small_multiples;
 mod timeline;
 
 pub use chart::{ChartLabels, MapAxes, Series, line_chart, map_chart};
+pub use columns::{Column, ColumnSheet, columns};
 pub use contact_sheet::{ContactSheetRow, contact_sheet};
+pub use small_multiples::{Across, Line, Look, Mark, Panel, Point, Sheet, small_multiples};
 pub use timeline::{PresentKind, TimelineEvent, timeline};
 
 /// Why a picture cannot be drawn.

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
+use super::flips::FlipFrame;
 use super::metrics::TileClasses;
 
 /// The whole result.
@@ -24,9 +25,6 @@ pub struct Report {
 pub struct CaptureScore {
     /// Name of what was recorded.
     pub name: String,
-    /// What the engines ran on, as they say. Told once, for all captures.
-    #[serde(skip)]
-    pub backend: String,
     /// Columns of the colour plane.
     pub width: u32,
     /// Rows of the colour plane.
@@ -39,8 +37,11 @@ pub struct CaptureScore {
     pub left_out: usize,
     /// Where the motion of the keys came from.
     pub key_motion: MotionCounts,
-    /// One entry per method.
+    /// One entry per method and backend.
     pub methods: Vec<MethodScore>,
+    /// Pictures for a flip viewer, where they were asked for.
+    #[serde(skip)]
+    pub flips: Vec<FlipFrame>,
 }
 
 /// How many keys have motion from where.
@@ -59,6 +60,8 @@ pub struct MotionCounts {
 pub struct MethodScore {
     /// Name of the method.
     pub name: &'static str,
+    /// What the engine ran on in the end, as it says.
+    pub backend: String,
     /// Whether it was given the key after the frame.
     pub interpolates: bool,
     /// Predicted frames.
@@ -83,6 +86,20 @@ pub struct MethodScore {
     pub ms_per_frame: Option<f64>,
     /// Work of the engine per key frame.
     pub ms_per_key: Option<f64>,
+    /// Every predicted frame, in order.
+    #[serde(skip)]
+    pub by_frame: Vec<FramePoint>,
+}
+
+/// How good one predicted frame is.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct FramePoint {
+    /// Its number in the recording.
+    pub frame: usize,
+    /// See [`super::metrics::psnr_rgb_db`].
+    pub psnr_rgb_db: f64,
+    /// See [`super::metrics::flip`].
+    pub flip: f64,
 }
 
 /// One method, over all captures on which it predicted anything.
@@ -90,6 +107,10 @@ pub struct MethodScore {
 pub struct MeanScore {
     /// Name of the method.
     pub name: &'static str,
+    /// What the engine ran on, on the first capture.
+    pub backend: String,
+    /// Whether it was given the key after the frame.
+    pub interpolates: bool,
     /// Mean of the captures' means.
     pub psnr_rgb_db: Option<f64>,
     /// Mean of the captures' means.
@@ -113,10 +134,13 @@ impl Report {
     #[must_use]
     pub fn new(threads: usize, captures: Vec<CaptureScore>) -> Self {
         // One that gave up its GPU on the way says so here.
-        let mut backends: Vec<_> =
-            captures.iter().map(|capture| capture.backend.as_str()).collect();
-        backends.dedup();
-        let backend = backends.join(", then ");
+        let mut backends: Vec<&str> = Vec::new();
+        for method in captures.iter().flat_map(|capture| &capture.methods) {
+            if !backends.contains(&method.backend.as_str()) {
+                backends.push(&method.backend);
+            }
+        }
+        let backend = backends.join(", ");
         let methods = captures.first().map_or(0, |capture| capture.methods.len());
         let mean = (0..methods)
             .map(|method| mean_score(captures.iter().map(|capture| &capture.methods[method])))
@@ -141,7 +165,7 @@ impl Report {
             );
             push_line(&mut text, HEADER);
             for method in &capture.methods {
-                push_line(&mut text, &method_row(method));
+                push_line(&mut text, &(method_row(method) + &on(&self.backend, &method.backend)));
             }
             push_line(&mut text, "");
         }
@@ -149,7 +173,7 @@ impl Report {
             push_line(&mut text, &format!("mean of {} captures", self.captures.len()));
             push_line(&mut text, HEADER);
             for mean in &self.mean {
-                push_line(&mut text, &mean_row(mean));
+                push_line(&mut text, &(mean_row(mean) + &on(&self.backend, &mean.backend)));
             }
             push_line(&mut text, "");
         }
@@ -164,6 +188,11 @@ impl Report {
 
 const HEADER: &str = "  method   frames    RGB      Y   SSIM   FLIP  worst  flicker  ms/frame  \
                       ms/key  Y by phase";
+
+/// What a row ran on, where not all ran on the same.
+fn on(all: &str, backend: &str) -> String {
+    if all == backend { String::new() } else { format!("  {backend}") }
+}
 
 fn push_line(text: &mut String, line: &str) {
     text.push_str(line);
@@ -231,6 +260,8 @@ fn mean_score<'a>(scores: impl Iterator<Item = &'a MethodScore> + Clone) -> Mean
     };
     MeanScore {
         name: scores.clone().next().map_or("", |score| score.name),
+        backend: scores.clone().next().map_or_else(String::new, |score| score.backend.clone()),
+        interpolates: scores.clone().next().is_some_and(|score| score.interpolates),
         psnr_rgb_db: mean(|score| score.psnr_rgb_db),
         psnr_y_db: mean(|score| score.psnr_y_db),
         ssim: mean(|score| score.ssim),
@@ -243,12 +274,13 @@ fn mean_score<'a>(scores: impl Iterator<Item = &'a MethodScore> + Clone) -> Mean
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn score(psnr: Option<f64>) -> MethodScore {
+    pub(in super::super) fn score(psnr: Option<f64>) -> MethodScore {
         MethodScore {
             name: "linear",
+            backend: "cpu".to_owned(),
             interpolates: false,
             frames: 36,
             psnr_rgb_db: psnr,
@@ -261,13 +293,13 @@ mod tests {
             error_flicker: Some(0.8),
             ms_per_frame: Some(3.1),
             ms_per_key: Some(2.4),
+            by_frame: Vec::new(),
         }
     }
 
-    fn capture(psnr: Option<f64>) -> CaptureScore {
+    pub(in super::super) fn capture(psnr: Option<f64>) -> CaptureScore {
         CaptureScore {
             name: "atrium".into(),
-            backend: "cpu".to_owned(),
             width: 640,
             height: 360,
             ratio: 3,
@@ -275,6 +307,7 @@ mod tests {
             left_out: 2,
             key_motion: MotionCounts { own: 1, composed: 10, missing: 2 },
             methods: vec![score(psnr)],
+            flips: Vec::new(),
         }
     }
 
@@ -286,10 +319,15 @@ mod tests {
 
     #[test]
     fn the_backend_is_what_the_engines_say_each_named_once() {
-        let on = |backend: &str| CaptureScore { backend: backend.to_owned(), ..capture(None) };
-        let report = |names: &[&str]| Report::new(1, names.iter().map(|it| on(it)).collect());
+        let on = |backend: &&str| MethodScore { backend: (*backend).to_owned(), ..score(None) };
+        let report = |names: &[&str]| {
+            let methods = names.iter().map(on).collect();
+            Report::new(1, vec![CaptureScore { methods, ..capture(None) }])
+        };
         assert_eq!(report(&["cpu", "cpu"]).backend, "cpu");
-        assert_eq!(report(&["gpu:a", "cpu"]).backend, "gpu:a, then cpu");
+        let mixed = report(&["gpu:a", "cpu", "gpu:a"]);
+        assert_eq!(mixed.backend, "gpu:a, cpu");
+        assert!(mixed.to_text().contains("  gpu:a\n"), "{}", mixed.to_text());
     }
 
     #[test]
@@ -302,6 +340,7 @@ mod tests {
         }
         let mut expected = vec![
             "name",
+            "backend",
             "interpolates",
             "frames",
             "psnr_rgb_db",

@@ -14,6 +14,7 @@ use foreframe_engine::{ColorPlane, Engine, EngineConfig, Method, MonoTime, Plane
 use foreframed::sink::srgb::SrgbConverter;
 use rayon::prelude::*;
 
+use super::flips::FlipFrame;
 use super::picture::{Srgb8, to_srgb8};
 use super::report::{CaptureScore, MotionCounts};
 use super::tally::{FrameScore, MethodTally, Truth};
@@ -28,12 +29,14 @@ pub struct ScoreOptions {
     pub methods: Vec<Method>,
     /// Frames from key to key.
     pub ratio: NonZeroUsize,
-    /// Makes the frames; without it the CPU does.
-    pub gpu: Option<Arc<Gpu>>,
+    /// What makes the frames, one after the other: None is the CPU.
+    pub backends: Vec<Option<Arc<Gpu>>>,
     /// Threads of the engine.
     pub threads: NonZeroUsize,
     /// The clock of the engine's work reports.
     pub timer: fn() -> MonoTime,
+    /// How many frames to keep for a flip viewer, spread over the recording.
+    pub kept_frames: usize,
 }
 
 /// Scores one recording. `on_key` is called after each key.
@@ -52,8 +55,14 @@ pub fn score_recording(
     let format = *reader.format();
     let converter = SrgbConverter::new(&format);
     let mut truths = TruthReader::new(*recording.format(), options);
-    let mut runs: Vec<_> =
-        options.methods.iter().map(|method| MethodRun::new(*method, format, options)).collect();
+    let mut runs: Vec<_> = options
+        .methods
+        .iter()
+        .flat_map(|method| options.backends.iter().map(|backend| (*method, backend.as_ref())))
+        .map(|(method, backend)| MethodRun::new(method, backend, format, options))
+        .collect();
+    let kept = kept_frames(&plan, options.kept_frames);
+    let mut flips = Vec::new();
 
     let mut key = reader.read(recording, &plan, 0)?;
     for index in 0..plan.keys.len() {
@@ -69,6 +78,7 @@ pub fn score_recording(
                 .with_context(|| format!("key frame {}", plan.keys[index].frame))?;
         }
         let truths: Vec<_> = predicted
+            .clone()
             .map(|frame| truths.read(recording, frame))
             .collect::<anyhow::Result<Vec<_>>>()?
             .into_par_iter()
@@ -83,8 +93,12 @@ pub fn score_recording(
                 .zip(&truths)
                 .map(|(output, truth)| FrameScore::of(&to_srgb8(output, &converter), truth))
                 .collect();
-            run.tally.add_frames(&frames, size, is_whole);
+            run.tally.add_frames(predicted.start, &frames, size, is_whole);
         });
+        for (place, frame) in predicted.enumerate().filter(|(_, frame)| kept.contains(frame)) {
+            let shown = runs.iter().map(|run| to_srgb8(&run.outputs[place], &converter));
+            flips.push(FlipFrame::new(frame, truths[place].picture(), shown));
+        }
         on_key();
         match next {
             Some(next) => key = next,
@@ -93,14 +107,17 @@ pub fn score_recording(
     }
     Ok(CaptureScore {
         name: name.to_owned(),
-        backend: runs.first().map(|run| run.engine.backend().name.clone()).unwrap_or_default(),
         width: format.width,
         height: format.height,
         ratio: options.ratio.get(),
         keys: plan.keys.len(),
         left_out: (0..plan.keys.len()).map(|key| plan.left_out(key)).sum(),
         key_motion: count_motion(&plan),
-        methods: runs.iter().map(|run| run.tally.finish()).collect(),
+        methods: runs
+            .iter()
+            .map(|run| run.tally.finish(run.engine.backend().name.clone()))
+            .collect(),
+        flips,
     })
 }
 
@@ -116,12 +133,24 @@ fn count_motion(plan: &Plan) -> MotionCounts {
     counts
 }
 
-fn engine_of(method: Method, format: StreamFormat, options: &ScoreOptions) -> Engine {
+/// Predicted frames to keep, `count` of them or all, evenly spread.
+fn kept_frames(plan: &Plan, count: usize) -> Vec<usize> {
+    let all: Vec<_> = (0..plan.keys.len()).flat_map(|key| plan.predicted(key)).collect();
+    let count = count.min(all.len());
+    (0..count).map(|place| all[(2 * place + 1) * all.len() / (2 * count)]).collect()
+}
+
+fn engine_of(
+    method: Method,
+    gpu: Option<&Arc<Gpu>>,
+    format: StreamFormat,
+    options: &ScoreOptions,
+) -> Engine {
     // Not damped: damping is for eyes, and the metrics have none.
     let config =
         EngineConfig { timer: options.timer, ..EngineConfig::new(method, options.threads) };
     let mut engine = Engine::new(format, config);
-    if let Some(gpu) = &options.gpu {
+    if let Some(gpu) = gpu {
         engine.use_gpu(gpu);
     }
     engine
@@ -137,10 +166,15 @@ struct MethodRun {
 }
 
 impl MethodRun {
-    fn new(method: Method, format: StreamFormat, options: &ScoreOptions) -> Self {
+    fn new(
+        method: Method,
+        gpu: Option<&Arc<Gpu>>,
+        format: StreamFormat,
+        options: &ScoreOptions,
+    ) -> Self {
         Self {
             method,
-            engine: engine_of(method, format, options),
+            engine: engine_of(method, gpu, format, options),
             newest: None,
             outputs: Vec::new(),
             tally: MethodTally::new(method, options.ratio.get()),
@@ -186,7 +220,12 @@ struct TruthReader {
 
 impl TruthReader {
     fn new(format: StreamFormat, options: &ScoreOptions) -> Self {
-        let engine = engine_of(Method::Hold, format, options);
+        let engine = engine_of(
+            Method::Hold,
+            options.backends.first().and_then(Option::as_ref),
+            format,
+            options,
+        );
         let converter = SrgbConverter::new(&format);
         Self { converter, engine, picture: ColorPlane::Rgba8(Plane::default()) }
     }

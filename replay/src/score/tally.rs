@@ -5,7 +5,7 @@ use foreframe_engine::{Method, MonoSpan};
 use super::metrics::flip::FlipTruth;
 use super::metrics::{ErrorPicture, TileTally, error_flicker, psnr_rgb_db, psnr_y_db, ssim};
 use super::picture::Srgb8;
-use super::report::MethodScore;
+use super::report::{FramePoint, MethodScore};
 
 /// A mean that grows.
 #[derive(Clone, Copy, Default, Debug)]
@@ -39,6 +39,12 @@ impl Truth {
     pub fn new(picture: Srgb8) -> Self {
         let flip = FlipTruth::new(&picture);
         Self { picture, flip }
+    }
+
+    /// The picture.
+    #[must_use]
+    pub fn picture(&self) -> &Srgb8 {
+        &self.picture
     }
 }
 
@@ -85,6 +91,7 @@ pub struct MethodTally {
     flicker: Mean,
     frame_ms: Mean,
     key_ms: Mean,
+    frames: Vec<FramePoint>,
 }
 
 impl MethodTally {
@@ -102,6 +109,7 @@ impl MethodTally {
             flicker: Mean::default(),
             frame_ms: Mean::default(),
             key_ms: Mean::default(),
+            frames: Vec::new(),
         }
     }
 
@@ -115,9 +123,15 @@ impl MethodTally {
         self.frame_ms.add(work.as_ms_f64());
     }
 
-    /// Adds the frames after one key, in order. `is_whole`: they reach to the next key, so that
+    /// Adds the frames after one key, in order, from number `first` on. `is_whole`: they reach to the next key, so that
     /// the step from the last of them to that key is one of successive output frames.
-    pub fn add_frames(&mut self, frames: &[FrameScore], size: (u32, u32), is_whole: bool) {
+    pub fn add_frames(
+        &mut self,
+        first: usize,
+        frames: &[FrameScore],
+        size: (u32, u32),
+        is_whole: bool,
+    ) {
         let key_error = ErrorPicture::of_key(size.0, size.1);
         let mut before = &key_error;
         for (place, frame) in frames.iter().enumerate() {
@@ -126,6 +140,11 @@ impl MethodTally {
             self.psnr_y_by_phase_db[place].add(frame.psnr_y_db);
             self.ssim.add(frame.ssim);
             self.flip.add(frame.flip);
+            self.frames.push(FramePoint {
+                frame: first + place,
+                psnr_rgb_db: frame.psnr_rgb_db,
+                flip: frame.flip,
+            });
             self.tiles.merge(&frame.tiles);
             self.flicker.add(error_flicker(before, &frame.error));
             before = &frame.error;
@@ -135,11 +154,12 @@ impl MethodTally {
         }
     }
 
-    /// The means.
+    /// The means, of frames that `backend` made.
     #[must_use]
-    pub fn finish(&self) -> MethodScore {
+    pub fn finish(&self, backend: String) -> MethodScore {
         MethodScore {
             name: self.method.name(),
+            backend,
             interpolates: self.method.interpolates(),
             frames: self.psnr_y_db.count,
             psnr_rgb_db: self.psnr_rgb_db.value(),
@@ -152,6 +172,7 @@ impl MethodTally {
             error_flicker: self.flicker.value(),
             ms_per_frame: self.frame_ms.value(),
             ms_per_key: self.key_ms.value(),
+            by_frame: self.frames.clone(),
         }
     }
 }

@@ -9,6 +9,8 @@
 //! Every number comes from a fixed seed and from pictures that are the same on every machine. No
 //! time is measured.
 
+pub mod page;
+pub mod plot;
 pub mod report;
 pub mod run;
 pub mod shoot;

@@ -244,3 +244,6 @@ impl Mean {
         (self.count > 0).then(|| self.sum / f64::from(self.count))
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,5 +1,8 @@
 // Pixels whose channels are integers: `color.rs` and `warp/sample.rs` in the same words.
-// Expects bindings `color` and `out`, a pixel being one word, or two of `RGBA16F`.
+// A pixel is one word, or two of `RGBA16F`. Takes bindings 1 and 2: a shader's own begin at 3.
+
+@group(0) @binding(1) var<storage, read> color: array<u32>;
+@group(0) @binding(2) var<storage, read_write> out: array<u32>;
 
 override FORMAT: u32 = 0u;
 

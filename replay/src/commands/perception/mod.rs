@@ -7,7 +7,6 @@ mod banding;
 mod displays;
 mod flicker;
 mod multiplex;
-mod plot;
 mod quality;
 mod retina;
 mod schedule;
@@ -20,6 +19,7 @@ use foreframe_perception::display::DisplayProfile;
 use foreframe_perception::motion_quality::Motion;
 use image::RgbImage;
 
+use super::plot;
 use crate::output::Output;
 
 /// Arguments of `foreframe perception`.

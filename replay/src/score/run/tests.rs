@@ -12,9 +12,10 @@ fn options(methods: &[Method]) -> ScoreOptions {
     ScoreOptions {
         methods: methods.to_vec(),
         ratio: count(4),
-        gpu: None,
+        backends: vec![None],
         threads: count(1),
         timer: || MonoTime::ZERO,
+        kept_frames: 0,
     }
 }
 
@@ -184,4 +185,31 @@ fn exact_motion_of_whole_pixels_is_predicted_to_the_bit() {
     assert_near(linear.error_flicker, 0.0);
     assert_near(linear.worst_tile_psnr_db, 50.0);
     assert_near(linear.flip, 0.0);
+}
+
+#[test]
+fn frames_to_keep_are_spread_over_all_that_are_predicted_and_no_more_than_there_are() {
+    let recording = MemoryRecording::moving_patch(13, STEP, &[4]);
+    let plan = Plan::new(recording.heads(), NonZeroUsize::new(4).unwrap());
+    assert!(kept_frames(&plan, 0).is_empty());
+    assert_eq!(kept_frames(&plan, 3), [2, 6, 10]);
+    assert_eq!(kept_frames(&plan, 50), [1, 2, 3, 5, 6, 7, 9, 10, 11]);
+}
+
+#[test]
+fn a_kept_frame_has_the_truth_and_what_each_method_made_of_it() {
+    let mut recording = MemoryRecording::moving_patch(9, STEP, &[4]);
+    let methods = [Method::Hold, Method::Linear];
+    let options = ScoreOptions { kept_frames: 2, ..options(&methods) };
+    let capture = score_recording("patch", &mut recording, &options, || {}).unwrap();
+    let frames: Vec<_> = capture.flips.iter().map(|flip| flip.frame).collect();
+    assert_eq!(frames, [2, 6]);
+    for flip in &capture.flips {
+        assert_eq!(flip.truth, picture(&recording, flip.frame));
+        assert_eq!(flip.shown.len(), 2);
+        assert_eq!(flip.shown[1], flip.truth, "linear is exact here");
+        assert_ne!(flip.shown[0], flip.truth);
+    }
+    let by_frame = &capture.methods[0].by_frame;
+    assert_eq!(by_frame.iter().map(|point| point.frame).collect::<Vec<_>>(), [1, 2, 3, 5, 6, 7]);
 }

@@ -1,8 +1,6 @@
 // Mean of two keys, the twin of `cpu.rs`.
 
-@group(0) @binding(1) var<storage, read> color: array<u32>;
-@group(0) @binding(2) var<storage, read> older: array<u32>;
-@group(0) @binding(3) var<storage, read_write> out: array<u32>;
+@group(0) @binding(3) var<storage, read> older: array<u32>;
 
 fn read_older(pixel: vec2<u32>) -> Texel {
     let index = pixel.y * params.size.x + pixel.x;

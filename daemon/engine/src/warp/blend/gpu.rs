@@ -7,6 +7,6 @@ pub const BLEND: Shader = Shader {
     file: "blend.wgsl",
     parts: &[COMMON, COLOR, include_str!("blend.wgsl")],
     cleared: &[],
-    bindings: &[Binding::Read(Slot::Color), Binding::Read(Slot::Older), Binding::Write(Slot::Out)],
+    bindings: &[Binding::Read(Slot::Color), Binding::Write(Slot::Out), Binding::Read(Slot::Older)],
     entries: &[Entry::tiles("blend", Extent::Pixels)],
 };

@@ -1,9 +1,6 @@
 // Backward warp, the twin of `cpu.rs`.
 
-@group(0) @binding(1) var<storage, read> color: array<u32>;
-@group(0) @binding(2) var<storage, read> velocity: array<u32>;
-@group(0) @binding(3) var<storage, read> tables: array<u32>;
-@group(0) @binding(4) var<storage, read_write> out: array<u32>;
+@group(0) @binding(4) var<storage, read> velocity: array<u32>;
 
 @compute @workgroup_size(16, 16)
 fn warp_gather(@builtin(global_invocation_id) id: vec3<u32>) {

@@ -9,9 +9,9 @@ pub const GATHER: Shader = Shader {
     cleared: &[],
     bindings: &[
         Binding::Read(Slot::Color),
-        Binding::Read(Slot::Velocity),
-        Binding::Read(Slot::Tables),
         Binding::Write(Slot::Out),
+        Binding::Read(Slot::Tables),
+        Binding::Read(Slot::Velocity),
     ],
     entries: &[Entry::tiles("warp_gather", Extent::Pixels)],
 };

@@ -17,12 +17,12 @@ pub const GRID: Shader = Shader {
     cleared: &[],
     bindings: &[
         Binding::Read(Slot::Color),
+        Binding::Write(Slot::Out),
         Binding::Read(Slot::Vertices),
         Binding::Read(Slot::Cuts),
         Binding::Write(Slot::Triangles),
         Binding::Write(Slot::Nearest),
         Binding::Write(Slot::Shown),
-        Binding::Write(Slot::Out),
     ],
     entries: &[
         Entry::tiles("clear_pixels", Extent::Pixels),

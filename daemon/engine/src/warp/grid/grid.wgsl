@@ -5,16 +5,14 @@
 // every pixel of its bounding box; the pixels inside are the same. Two atomic passes, free of order,
 // choose the triangle of each pixel.
 
-@group(0) @binding(1) var<storage, read> color: array<u32>;
 // Per vertex: x and y in 1/16 px, velocity, depth key.
-@group(0) @binding(2) var<storage, read> vertices: array<vec4<u32>>;
+@group(0) @binding(3) var<storage, read> vertices: array<vec4<u32>>;
 // Per cell: 0 where the cut falls from the top left, 1 where it rises from the bottom left.
-@group(0) @binding(3) var<storage, read> cuts: array<u32>;
-@group(0) @binding(4) var<storage, read_write> triangles: array<Triangle>;
+@group(0) @binding(4) var<storage, read> cuts: array<u32>;
+@group(0) @binding(5) var<storage, read_write> triangles: array<Triangle>;
 // Per pixel: the largest depth of its triangles, and the one that it shows.
-@group(0) @binding(5) var<storage, read_write> nearest: array<atomic<u32>>;
-@group(0) @binding(6) var<storage, read_write> shown: array<atomic<u32>>;
-@group(0) @binding(7) var<storage, read_write> out: array<u32>;
+@group(0) @binding(6) var<storage, read_write> nearest: array<atomic<u32>>;
+@group(0) @binding(7) var<storage, read_write> shown: array<atomic<u32>>;
 
 const FARTHEST: i32 = 8064;
 const NO_TRIANGLE: u32 = 0xffffffffu;

@@ -9,13 +9,13 @@ pub const LINEAR: Shader = Shader {
     cleared: &[],
     bindings: &[
         Binding::Read(Slot::Color),
+        Binding::Write(Slot::Out),
+        Binding::Read(Slot::Tables),
         Binding::Read(Slot::Held),
         Binding::Read(Slot::Near),
         Binding::Read(Slot::Carried),
         Binding::Read(Slot::Origin),
         Binding::Read(Slot::Broken),
-        Binding::Read(Slot::Tables),
-        Binding::Write(Slot::Out),
     ],
     entries: &[
         Entry::tiles("warp_linear", Extent::Pixels),

@@ -1,16 +1,13 @@
 // The linear method at full resolution, the twin of `cpu.rs`, `between.rs`, `broken.rs` and
 // `fill.rs`.
 
-@group(0) @binding(1) var<storage, read> color: array<u32>;
 // Of the key, as the scatter read them.
-@group(0) @binding(2) var<storage, read> held: array<u32>;
-@group(0) @binding(3) var<storage, read> near: array<u32>;
+@group(0) @binding(4) var<storage, read> held: array<u32>;
+@group(0) @binding(5) var<storage, read> near: array<u32>;
 // Of the cells of this frame: velocity, source or far side of a hole, and which are broken.
-@group(0) @binding(4) var<storage, read> carried: array<u32>;
-@group(0) @binding(5) var<storage, read> origin: array<u32>;
-@group(0) @binding(6) var<storage, read> broken: ListedCells;
-@group(0) @binding(7) var<storage, read> tables: array<u32>;
-@group(0) @binding(8) var<storage, read_write> out: array<u32>;
+@group(0) @binding(6) var<storage, read> carried: array<u32>;
+@group(0) @binding(7) var<storage, read> origin: array<u32>;
+@group(0) @binding(8) var<storage, read> broken: ListedCells;
 
 // (1) everywhere; what is wrong in broken cells is made anew by `warp_broken`, and only there.
 @compute @workgroup_size(16, 16)
