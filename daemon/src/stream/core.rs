@@ -9,7 +9,9 @@ use std::sync::Arc;
 use foreframe_engine::backend::BackendStatus;
 use foreframe_engine::backend::gpu::Gpu;
 use foreframe_engine::engine::MotionState;
-use foreframe_engine::pacing::{Pacer, PacerConfig, PacerStatus, Plan, TimerDisplay, WorkEstimate};
+use foreframe_engine::pacing::{
+    Pacer, PacerConfig, PacerStatus, Plan, RefreshKind, TimerDisplay, WorkEstimate,
+};
 use foreframe_engine::{
     ColorPlane, DecodeError, Engine, EngineConfig, KeyInput, KeyReport, Method, MonoSpan, MonoTime,
     Phase, StreamFormat,
@@ -141,9 +143,10 @@ impl StreamCore {
     pub fn new(format: StreamFormat, config: &CoreConfig) -> Self {
         let pacer = Pacer::new(PacerConfig {
             refresh_interval: config.refresh_interval,
+            refresh: RefreshKind::Fixed,
             known_refresh: Some(config.display_origin),
             interpolates: config.engine.method.interpolates(),
-            work: WorkEstimate::Measured,
+            work: WorkEstimate::Measured { first: config.refresh_interval.scale(1, 4) },
         });
         Self {
             engine: Engine::new(format, config.engine),
@@ -214,7 +217,7 @@ impl StreamCore {
             .shown
             .is_some_and(|shown| (shown.content_time, shown.keys) == (content_time, key.taken));
         if is_shown_already {
-            self.pacer.on_presented(plan.present_at, plan.present_at);
+            self.pacer.on_presented(plan.present_at, plan.present_at, plan.present_at);
             self.count_until(plan.present_at);
             return Some(FrameOutcome::Repeated);
         }
@@ -233,7 +236,7 @@ impl StreamCore {
         }
         // Ready early: the display still shows it at the refresh that it was planned for.
         let presented_at = plan.present_at;
-        self.pacer.on_presented(plan.present_at, presented_at);
+        self.pacer.on_presented(plan.present_at, presented_at, presented_at);
         match kind {
             FrameKind::Real => self.counts.real += 1,
             FrameKind::Synthesised => self.counts.synthesised += 1,

@@ -165,7 +165,7 @@ wire_struct! {
     }
 }
 
-/// How well one submission met the display. Durations only, so that no clock has to be shared.
+/// How well submissions meet the display, as of the newest. Durations only, so that no clock has to be shared.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Pacing {
     /// The client's number of the stream.
@@ -174,10 +174,12 @@ pub struct Pacing {
     pub key_index: u64,
     /// Time between two refreshes of the display.
     pub refresh_interval_ns: u64,
-    /// Time that was left when the key frame arrived, before the first refresh that could show it
-    /// closed; negative: that refresh was missed.
+    /// How much later key frames could arrive without being shown later, smoothed; 0 to one refresh
+    /// interval.
     pub slack_ns: i64,
-    /// How much later than the steady rhythm of key frames this one came; negative: earlier.
+    /// How much later the application should start its frames to be shown soonest after they arrive;
+    /// negative: earlier. At most half a refresh interval. Following a sixteenth of it a frame is
+    /// stable.
     pub phase_error_ns: i64,
 }
 

@@ -3,14 +3,29 @@
 //! Work is the 95th percentile of recent frames, counted from the planned wake, so that late
 //! scheduling counts as work. A key shown as it is takes a fraction of what an in-between frame
 //! takes, and is estimated apart. The margin widens at once after a miss and shrinks slowly.
+//!
+//! The frames above the 95th percentile live off the margin. Where they take more than that, again
+//! and again, the work has spikes: then it is estimated by the longest recent one, as far as that
+//! costs no refresh.
 
 use super::recent::Recent;
 use crate::time::MonoSpan;
 
 /// Frames that the work estimate looks back on: half a second at 120 Hz.
 const WORK_WINDOW: usize = 64;
+/// Of fewer there is no 95th percentile: until then half as much again is planned for, but no more
+/// than the first guess.
+const WORK_TO_LEARN: usize = 20;
 /// A twentieth of the frames may take longer than planned and live off the margin.
 const WORK_PERCENTILE: usize = 95;
+/// Two frames that take more than estimate and margin within so many mean that the work has spikes:
+/// 1.6 %, once a second at 120 Hz.
+const SPIKY_WITHIN: u32 = 128;
+/// Spikes are counted on to be longer than the longest recent one by this, in percent.
+const SPIKY_PERCENT: i64 = 125;
+/// What spikes may raise work and margin to, as eighths of a refresh. Beyond a whole one, a picture
+/// for each refresh could no longer be made.
+const SPIKY_EIGHTHS: i64 = 7;
 /// What the hand-over itself takes: a message to a compositor, and its latch.
 const HAND_OVER: MonoSpan = MonoSpan::from_us(250);
 /// Margin that is never given up: the hand-over, and as much again for the work that takes longer
@@ -24,8 +39,11 @@ const MARGIN_DECAY_DIVISOR: i64 = 50;
 /// How long synthesis is expected to take.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum WorkEstimate {
-    /// Learned from [`Pacer::on_work`](super::Pacer::on_work).
-    Measured,
+    /// Learned from [`Pacer::on_work`](super::Pacer::on_work); `first` before anything was measured.
+    Measured {
+        /// Guess for the first picture.
+        first: MonoSpan,
+    },
     /// Always this, so that plans repeat exactly.
     Constant(MonoSpan),
 }
@@ -54,6 +72,30 @@ struct RecentWork {
     work: Recent<WORK_WINDOW>,
     /// The percentile of `work`. None before anything was measured.
     measured: Option<MonoSpan>,
+    /// The longest of `work`.
+    longest: MonoSpan,
+    /// Frames since the last spike, and since the one before that.
+    since_spike: Option<u32>,
+    since_spike_before: Option<u32>,
+}
+
+impl RecentWork {
+    fn push(&mut self, work: MonoSpan, margin: MonoSpan) {
+        let later =
+            |frames: &mut Option<u32>| *frames = frames.map(|count| count.saturating_add(1));
+        later(&mut self.since_spike);
+        later(&mut self.since_spike_before);
+        if self.measured.is_some_and(|usual| work > usual + margin) {
+            self.since_spike_before = self.since_spike.replace(0);
+        }
+        self.work.push(work.max(MonoSpan::ZERO));
+        self.measured = self.work.percentile(WORK_PERCENTILE);
+        self.longest = self.work.percentile(100).unwrap_or_default();
+    }
+
+    fn is_spiky(&self) -> bool {
+        self.since_spike_before.is_some_and(|frames| frames < SPIKY_WITHIN)
+    }
 }
 
 impl Budget {
@@ -63,7 +105,7 @@ impl Budget {
     }
 
     /// Expected time from wake to the picture being ready. Of a kind that was not measured yet the
-    /// same as of the other, and before anything was measured a quarter of a refresh.
+    /// same as of the other.
     pub(super) fn work(&self, shows: Shows, refresh_interval: MonoSpan) -> MonoSpan {
         let (own, other) = match shows {
             Shows::Key => (&self.keys, &self.in_betweens),
@@ -71,9 +113,31 @@ impl Budget {
         };
         match self.estimate {
             WorkEstimate::Constant(work) => work.max(MonoSpan::ZERO),
-            WorkEstimate::Measured => {
-                own.measured.or(other.measured).unwrap_or(refresh_interval.scale(1, 4))
+            WorkEstimate::Measured { first } => {
+                let first = first.max(MonoSpan::ZERO);
+                let usual = match own.measured.or(other.measured) {
+                    None => first,
+                    Some(measured) if own.work.len() < WORK_TO_LEARN => {
+                        measured.max(first.min(measured.scale(3, 2)))
+                    }
+                    Some(measured) => measured,
+                };
+                let room = refresh_interval.scale(SPIKY_EIGHTHS, 8) - self.margin(refresh_interval);
+                let spike = own.longest.scale(SPIKY_PERCENT, 100);
+                if own.is_spiky() { usual.max(spike.min(room)) } else { usual }
             }
+        }
+    }
+
+    /// The same for the rule that maps content time, which must not start with a guess that is too
+    /// long: shortening it later shows as a jump.
+    pub(super) fn work_at_best(&self, refresh_interval: MonoSpan) -> MonoSpan {
+        let work = self.work(Shows::InBetween, refresh_interval);
+        let measured = self.in_betweens.measured.or(self.keys.measured);
+        if self.in_betweens.work.len() < WORK_TO_LEARN {
+            work.min(measured.unwrap_or(refresh_interval.scale(1, 4)))
+        } else {
+            work
         }
     }
 
@@ -93,8 +157,8 @@ impl Budget {
             Shows::Key => &mut self.keys,
             Shows::InBetween => &mut self.in_betweens,
         };
-        recent.work.push(work.max(MonoSpan::ZERO));
-        recent.measured = recent.work.percentile(WORK_PERCENTILE);
+        // What the margin is for without any misses.
+        recent.push(work, MARGIN_FLOOR);
     }
 
     pub(super) fn on_good(&mut self) {
@@ -119,19 +183,19 @@ mod tests {
 
     #[test]
     fn one_spike_in_a_window_does_not_move_the_estimate_but_many_do() {
-        let mut budget = Budget::new(WorkEstimate::Measured);
+        let mut budget = Budget::new(WorkEstimate::Measured { first: MonoSpan::from_ms(2) });
         let work = |budget: &Budget| budget.work(Shows::InBetween, REFRESH);
         assert_eq!(work(&budget), MonoSpan::from_ms(2));
         (0..WORK_WINDOW).for_each(|_| budget.on_work(Shows::InBetween, MonoSpan::from_ms(3)));
         budget.on_work(Shows::InBetween, MonoSpan::from_ms(30));
         assert_eq!(work(&budget), MonoSpan::from_ms(3));
         (0..5).for_each(|_| budget.on_work(Shows::InBetween, MonoSpan::from_ms(5)));
-        assert_eq!(work(&budget), MonoSpan::from_ms(5));
+        assert!(work(&budget) >= MonoSpan::from_ms(5));
     }
 
     #[test]
     fn keys_and_in_betweens_are_estimated_apart_once_both_were_measured() {
-        let mut budget = Budget::new(WorkEstimate::Measured);
+        let mut budget = Budget::new(WorkEstimate::Measured { first: MonoSpan::ZERO });
         budget.on_work(Shows::InBetween, MonoSpan::from_ms(6));
         assert_eq!(budget.work(Shows::Key, REFRESH), MonoSpan::from_ms(6));
         budget.on_work(Shows::Key, MonoSpan::from_ms(1));
@@ -154,5 +218,37 @@ mod tests {
         (0..2_000).for_each(|_| budget.on_good());
         assert!(budget.margin(REFRESH) <= floor + MonoSpan::from_us(1));
         budget.verify_invariants();
+    }
+
+    #[test]
+    fn spikes_that_come_again_are_planned_for_as_far_as_no_refresh_is_lost() {
+        let mut budget = Budget::new(WorkEstimate::Measured { first: MonoSpan::ZERO });
+        let spike = |budget: &mut Budget, ms: i64| {
+            (0..40).for_each(|_| budget.on_work(Shows::InBetween, MonoSpan::from_ms(2)));
+            budget.on_work(Shows::InBetween, MonoSpan::from_ms(ms));
+        };
+        let work = |budget: &Budget| budget.work(Shows::InBetween, REFRESH);
+        spike(&mut budget, 5);
+        assert_eq!(work(&budget), MonoSpan::from_ms(2), "once is an outlier");
+        spike(&mut budget, 5);
+        assert_eq!(work(&budget), MonoSpan::from_us(6_250));
+        assert_eq!(budget.work(Shows::Key, REFRESH), MonoSpan::from_ms(2), "keys have none");
+        spike(&mut budget, 30);
+        assert_eq!(work(&budget) + budget.margin(REFRESH), REFRESH.scale(7, 8));
+        (0..200).for_each(|_| budget.on_work(Shows::InBetween, MonoSpan::from_ms(2)));
+        assert_eq!(work(&budget), MonoSpan::from_ms(2), "forgotten");
+    }
+
+    #[test]
+    fn the_first_few_pictures_are_given_half_as_much_again() {
+        let mut budget = Budget::new(WorkEstimate::Measured { first: MonoSpan::from_ms(7) });
+        let work = |budget: &Budget| budget.work(Shows::InBetween, REFRESH);
+        assert_eq!(work(&budget), MonoSpan::from_ms(7));
+        assert_eq!(budget.work_at_best(REFRESH), REFRESH.scale(1, 4));
+        budget.on_work(Shows::InBetween, MonoSpan::from_ms(2));
+        assert_eq!(work(&budget), MonoSpan::from_ms(3));
+        assert_eq!(budget.work_at_best(REFRESH), MonoSpan::from_ms(2));
+        (1..WORK_TO_LEARN).for_each(|_| budget.on_work(Shows::InBetween, MonoSpan::from_ms(2)));
+        assert_eq!(work(&budget), MonoSpan::from_ms(2));
     }
 }

@@ -19,6 +19,14 @@ const FIRST_INTERVAL: MonoSpan = MonoSpan::from_ms(25);
 /// Velocity stays full for at most this many key intervals, in halves, however wild the jitter;
 /// with the rest of the easing that keeps the phase below 4.
 const LONGEST_LEAD_HALVES: i64 = 5;
+/// Key intervals are even if from the 5th to the 95th percentile they differ by less than a tenth of
+/// the refresh interval.
+const EVEN_DIVISOR: i64 = 10;
+/// An application keeps up with a display if its usual key interval is at most this share of the
+/// refresh interval, in percent, and even,
+const KEEP_UP_PERCENT: i64 = 102;
+/// or if it is this much faster, however uneven.
+const FAST_PERCENT: i64 = 70;
 
 /// When keys come.
 #[derive(Clone, Debug, Default)]
@@ -30,6 +38,19 @@ pub(super) struct KeyCadence {
     interval: Option<MonoSpan>,
     /// The longest gap that is no outlier. None without gaps.
     usual_gap: Option<MonoSpan>,
+    /// None before `INTERVAL_WINDOW` keys.
+    evenness: Option<Evenness>,
+}
+
+/// How evenly keys come.
+#[derive(Clone, Copy, Debug)]
+struct Evenness {
+    /// 95th percentile of the intervals.
+    longest_interval: MonoSpan,
+    /// From their 5th percentile to that.
+    interval_spread: MonoSpan,
+    /// The same of the gaps.
+    gap_spread: MonoSpan,
 }
 
 impl KeyCadence {
@@ -40,6 +61,7 @@ impl KeyCadence {
             self.gaps.push(first_refresh - previous);
             self.interval = self.intervals.percentile(50);
             self.usual_gap = self.upper_fence();
+            self.evenness = self.measure_evenness();
         }
         self.previous = Some(content_time);
     }
@@ -49,11 +71,27 @@ impl KeyCadence {
         self.previous = Some(content_time);
         self.gaps.clear();
         self.usual_gap = None;
+        self.evenness = None;
     }
 
     /// Usual content time from one key to the next. None before the second key.
     pub(super) fn interval(&self) -> Option<MonoSpan> {
         self.interval
+    }
+
+    /// Whether keys come one for each refresh, or more: there is nothing to put in between then.
+    pub(super) fn keeps_up_with(&self, refresh_interval: MonoSpan) -> bool {
+        let Some((interval, even)) = self.interval.zip(self.evenness) else { return false };
+        let is_even =
+            self.is_even(refresh_interval) && even.gap_spread < refresh_interval.scale(1, 2);
+        even.longest_interval <= refresh_interval.scale(FAST_PERCENT, 100)
+            || (is_even && interval <= refresh_interval.scale(KEEP_UP_PERCENT, 100))
+    }
+
+    /// Whether content times of keys are evenly spaced, as seen on such a display.
+    pub(super) fn is_even(&self, refresh_interval: MonoSpan) -> bool {
+        let most = refresh_interval.scale(1, EVEN_DIVISOR);
+        self.evenness.is_some_and(|even| even.interval_spread < most)
     }
 
     /// How content time may run ahead of a key while present time is `delay` ahead of it.
@@ -68,6 +106,18 @@ impl KeyCadence {
     fn upper_fence(&self) -> Option<MonoSpan> {
         let (middle, upper) = (self.gaps.percentile(50)?, self.gaps.percentile(75)?);
         Some(upper + (upper - middle).scale(2, 1))
+    }
+
+    fn measure_evenness(&self) -> Option<Evenness> {
+        if self.gaps.len() < INTERVAL_WINDOW {
+            return None;
+        }
+        let longest_interval = self.intervals.percentile(95)?;
+        Some(Evenness {
+            longest_interval,
+            interval_spread: longest_interval - self.intervals.percentile(5)?,
+            gap_spread: self.gaps.percentile(95)? - self.gaps.percentile(5)?,
+        })
     }
 }
 
@@ -110,5 +160,27 @@ mod tests {
         let easing = cadence.easing(MonoSpan::from_ms(8));
         assert!(easing.full_until >= MonoSpan::from_ms(34), "{easing:?}");
         assert!(easing.full_until <= MonoSpan::from_ms(40), "{easing:?}");
+    }
+
+    #[test]
+    fn keys_one_for_each_refresh_keep_up_and_others_do_not() {
+        let refresh = MonoSpan::from_ms(10);
+        let keeps_up = |key_us: i64, jitter_us: i64, wait: fn(i64) -> i64| {
+            let mut cadence = KeyCadence::default();
+            for key in 0..64 {
+                let content = key * key_us + (key % 2) * jitter_us;
+                let time = |us| MonoTime::ZERO + MonoSpan::from_us(us);
+                cadence.on_key(time(content), time(content + wait(key)));
+            }
+            cadence.keeps_up_with(refresh)
+        };
+        assert!(keeps_up(10_000, 0, |_| 9_000));
+        assert!(keeps_up(10_100, 0, |_| 9_000), "a little slower");
+        assert!(!keeps_up(10_400, 0, |_| 9_000), "slower");
+        assert!(!keeps_up(10_000, 3_000, |_| 9_000), "uneven content");
+        assert!(!keeps_up(10_000, 0, |key| 9_000 + key % 3 * 5_000), "uneven arrivals");
+        assert!(keeps_up(5_000, 1_500, |key| 9_000 + key % 3 * 3_000), "much faster");
+        let few = KeyCadence::default();
+        assert!(!few.keeps_up_with(refresh), "unknown");
     }
 }

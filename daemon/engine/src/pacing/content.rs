@@ -6,6 +6,11 @@
 //! delay slews, so that keys with uneven content times, and keys that arrive unevenly, move the
 //! line by a fraction of a percent of its velocity.
 //!
+//! Where keys come evenly but arrive unevenly, the offer of an early key is a whole refresh smaller
+//! than that of the others, and the first such key would make the line jump. When the display's clock
+//! drifts against the application's, that is foreseen: a key that was as early as the earliest of
+//! late would reach an earlier refresh by now, so the line already moves there.
+//!
 //! Two things make it jump, both counted: the application's clock steps (content times run
 //! backwards, or leap ahead), or keys stay behind for so long that it is no jitter.
 
@@ -19,12 +24,28 @@ const WINDOW: usize = 128;
 /// as long, and one early key keeps all others from being shown as they are for seconds (1 real
 /// frame of 2400 with arrivals jittering by 2 ms, against 2026), with no less judder.
 const FOLLOW_TIME: MonoSpan = MonoSpan::from_ms(500);
-/// It changes by at most 1/32 of the time that passes: velocity on the screen stays within 3 %.
-const FASTEST_SLEW_DIVISOR: i64 = 32;
+/// It changes by at most 1/64 of the time that passes: velocity on the screen stays within 1.6 %, and
+/// getting over a whole refresh (8.3 ms in half a second) costs less than 1 % of judder.
+const FASTEST_SLEW_DIVISOR: i64 = 64;
 /// Content time that leaps ahead by more was set, not jittered.
 const FORWARD_STEP: MonoSpan = MonoSpan::from_ms(250);
 /// So many keys in a row that lag by more than the caller allows have a new delay: 0.4 s at 40 Hz.
 const LAGGING_KEYS: u32 = 16;
+
+/// A key may be earlier than the earliest of late by this before it takes the clock by surprise.
+const FORESIGHT: MonoSpan = MonoSpan::from_us(100);
+
+/// A key that has arrived.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct KeyOffer {
+    pub(super) content_time: MonoTime,
+    /// When its picture could be ready.
+    pub(super) ready_at: MonoTime,
+    /// The first refresh after that which is not taken.
+    pub(super) first_refresh: MonoTime,
+    /// A cut lets the line jump at once, for nobody can see it.
+    pub(super) is_cut: bool,
+}
 
 /// What a key meant for the clock.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -43,6 +64,8 @@ pub(super) enum KeyTiming {
 pub(super) struct ContentClock {
     newest: Option<MonoTime>,
     offers: Recent<WINDOW>,
+    /// From content time to when a picture could be ready.
+    readiness: Recent<WINDOW>,
     /// The smallest of `offers`.
     target: Option<MonoSpan>,
     line: Option<Line>,
@@ -57,15 +80,15 @@ struct Line {
 }
 
 impl ContentClock {
-    /// A key has arrived that `first_refresh` is the first to show. Lag beyond `lag_limit` is no
-    /// jitter if it lasts; a cut lets the line jump at once, for nobody can see it.
+    /// A key has arrived. Lag beyond `lag_limit` is no jitter if it lasts. `reachable` tells the first
+    /// refresh at or after a time, if it makes sense to foresee how early the next keys can be shown.
     pub(super) fn on_key(
         &mut self,
-        content_time: MonoTime,
-        first_refresh: MonoTime,
+        key: &KeyOffer,
         lag_limit: MonoSpan,
-        is_cut: bool,
+        reachable: impl Fn(MonoTime) -> Option<MonoTime>,
     ) -> KeyTiming {
+        let &KeyOffer { content_time, ready_at, first_refresh, is_cut } = key;
         let offer = first_refresh - content_time;
         let went_back = self.newest.is_some_and(|newest| content_time < newest);
         self.newest = Some(content_time);
@@ -77,7 +100,10 @@ impl ContentClock {
             self.start_anew(first_refresh, offer);
             return KeyTiming::Stepped;
         }
-        self.offers.push(offer);
+        self.readiness.push(ready_at - content_time);
+        let earliest = self.readiness.min().unwrap_or_default() - FORESIGHT;
+        let foreseen = reachable(content_time + earliest).map_or(offer, |at| at - content_time);
+        self.offers.push(offer.min(foreseen));
         self.target = self.offers.min();
         if is_cut {
             self.line = self.target.map(|delay| Line { present_at: first_refresh, delay });
@@ -87,6 +113,7 @@ impl ContentClock {
             return KeyTiming::Followed;
         }
         self.offers.keep_newest(LAGGING_KEYS as usize);
+        self.readiness.keep_newest(LAGGING_KEYS as usize);
         self.target = self.offers.min();
         self.line = self.target.map(|delay| Line { present_at: first_refresh, delay });
         self.lagging = 0;
@@ -109,6 +136,7 @@ impl ContentClock {
     }
 
     fn start_anew(&mut self, first_refresh: MonoTime, offer: MonoSpan) {
+        self.readiness.clear();
         self.offers.clear();
         self.offers.push(offer);
         self.target = Some(offer);
@@ -134,12 +162,18 @@ mod tests {
         MonoTime::ZERO + MonoSpan::from_ms(ms)
     }
 
+    fn take_key(clock: &mut ContentClock, content: i64, refresh: i64, is_cut: bool) -> KeyTiming {
+        let (content_time, first_refresh) = (ms(content), ms(refresh));
+        let offer = KeyOffer { content_time, ready_at: first_refresh, first_refresh, is_cut };
+        clock.on_key(&offer, LAG_LIMIT, |_| None)
+    }
+
     /// Keys every 25 ms whose first refresh is `offers` after their content time.
     fn clock(offers: impl IntoIterator<Item = i64>) -> (ContentClock, Vec<KeyTiming>) {
         let mut clock = ContentClock::default();
         let timings = (10..)
             .zip(offers)
-            .map(|(key, offer)| clock.on_key(ms(key * 25), ms(key * 25 + offer), LAG_LIMIT, false));
+            .map(|(key, offer)| take_key(&mut clock, key * 25, key * 25 + offer, false));
         let timings = timings.collect();
         (clock, timings)
     }
@@ -176,10 +210,10 @@ mod tests {
     #[test]
     fn steps_of_the_application_clock_start_it_anew() {
         let (mut clock, _) = clock([10; 10]);
-        let leap = clock.on_key(ms(1_500), ms(510), LAG_LIMIT, false);
+        let leap = take_key(&mut clock, 1_500, 510, false);
         assert_eq!(leap, KeyTiming::Stepped);
         assert_eq!(clock.delay_at(ms(510)), Some(MonoSpan::from_ms(-990)));
-        let back = clock.on_key(ms(1_499), ms(535), LAG_LIMIT, false);
+        let back = take_key(&mut clock, 1_499, 535, false);
         assert_eq!(back, KeyTiming::Stepped);
         clock.verify_invariants();
     }
@@ -187,7 +221,31 @@ mod tests {
     #[test]
     fn at_a_cut_the_delay_takes_its_target_at_once() {
         let (mut clock, _) = clock([10; 10]);
-        clock.on_key(ms(500), ms(504), LAG_LIMIT, true);
+        take_key(&mut clock, 500, 504, true);
         assert_eq!(clock.delay_at(ms(504)), Some(MonoSpan::from_ms(4)));
+    }
+
+    #[test]
+    fn an_earlier_refresh_that_comes_into_reach_is_foreseen() {
+        // Refreshes every 10 ms from `phase` on, keys every 30 ms, ready 12 to 15 ms later.
+        let foreseen = |phase: i64| {
+            let mut clock = ContentClock::default();
+            for index in 0..20 {
+                let content_time = ms(index * 30);
+                let ready_at = content_time + MonoSpan::from_ms(if index == 3 { 12 } else { 15 });
+                let at_or_after = |time: MonoTime| {
+                    let since = (time - ms(phase)).as_ns();
+                    ms(phase) + MonoSpan::from_ms(10).scale((since + 9_999_999) / 10_000_000, 1)
+                };
+                // The key that was early did not come early enough, back then.
+                let first_refresh = at_or_after(ready_at.max(content_time + MonoSpan::from_ms(15)));
+                let offer = KeyOffer { content_time, ready_at, first_refresh, is_cut: false };
+                clock.on_key(&offer, LAG_LIMIT, |time| (index > 3).then(|| at_or_after(time)));
+            }
+            clock.target.unwrap()
+        };
+        assert_eq!(foreseen(4), MonoSpan::from_ms(14), "in reach of the early key");
+        assert_eq!(foreseen(1), MonoSpan::from_ms(21), "out of reach");
+        assert_eq!(foreseen(8), MonoSpan::from_ms(18), "one refresh for all");
     }
 }

@@ -1,91 +1,30 @@
 //! The state machine: joins grid, content clock, cadence and budget into plans.
 
-use super::budget::{Budget, Shows, WorkEstimate};
+use super::budget::{Budget, Shows};
 use super::cadence::KeyCadence;
-use super::content::{ContentClock, KeyTiming};
+use super::content::{ContentClock, KeyOffer, KeyTiming};
+use super::flight::Flight;
 use super::refresh::RefreshTracker;
+use super::types::{FeedbackState, PacerConfig, PacerCounts, PacerStatus, Plan, RefreshKind};
+use super::variable::VariableRefresh;
 use crate::time::{MonoSpan, MonoTime};
 
 /// A frame less than refresh interval / this ahead of its key is the key: what warping would move
 /// is below what an eye can follow, and a picture that is not resampled is sharper.
 const SAME_AS_KEY_DIVISOR: i64 = 32;
+/// The same on a variable display, where a key comes at any instant and would hardly ever be shown
+/// as it is: a millisecond at 120 Hz.
+const SAME_AS_KEY_DIVISOR_VARIABLE: i64 = 8;
 /// Weight of a new key in the slack told to the application, as a divisor.
 const SLACK_SMOOTHING_DIVISOR: i64 = 8;
 /// Slack that the application should aim at: late enough to be fresh, early enough to be safe.
 const TARGET_SLACK: MonoSpan = MonoSpan::from_us(500);
-
-/// What a pacer has to know before the first frame.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct PacerConfig {
-    /// Announced display period; the tracked one starts from it and stays within 1/16 of it.
-    pub refresh_interval: MonoSpan,
-    /// An instant at which the display refreshes, where it is known beforehand (timer sinks,
-    /// replay). Else the first plan sets the grid and the first feedback corrects it.
-    pub known_refresh: Option<MonoTime>,
-    /// Adds one key interval of delay, for methods that need the key after the content time.
-    pub interpolates: bool,
-    /// Where the work estimate comes from.
-    pub work: WorkEstimate,
-}
-
-/// The next frame. `wake_at <= submit_by <= present_at`, and none lies before the `now` it was
-/// planned at.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Plan {
-    /// When to start to make the picture.
-    pub wake_at: MonoTime,
-    /// When it has to be handed to the display at the latest, for displays that need it some time
-    /// before. One that only counts its refreshes takes a picture until `present_at`.
-    pub submit_by: MonoTime,
-    /// When the display starts to show it.
-    pub present_at: MonoTime,
-    /// Which content time it shows, after easing; never before the newest key's unless the method
-    /// interpolates. Equal to the newest key's where that key is to be shown as it is. None before
-    /// the first key.
-    pub content_time: Option<MonoTime>,
-}
-
-/// Events since the pacer was made.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct PacerCounts {
-    /// Frames shown at their planned refresh.
-    pub on_target: u64,
-    /// Frames not shown at their planned refresh: shown at another, never shown, or dropped.
-    pub missed: u64,
-    /// Frames that were not ready in time and were not handed over. Part of `missed`.
-    pub dropped: u64,
-    /// Steps of the application's clock, forwards or backwards.
-    pub clock_steps: u64,
-    /// Times that keys fell behind for good and the content clock followed.
-    pub relocks: u64,
-    /// Presentation timestamps that were off the grid and not followed.
-    pub distrusted_timestamps: u64,
-}
-
-/// What is known about display and application, as durations: they hold across clock borders.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct PacerStatus {
-    /// Tracked time from refresh to refresh.
-    pub refresh_interval: MonoSpan,
-    /// Usual content time from key to key. None before the second key.
-    pub key_interval: Option<MonoSpan>,
-    /// How much later keys could have arrived without being shown later, smoothed.
-    /// 0 to one refresh interval. None before the first key.
-    pub slack: Option<MonoSpan>,
-    /// By how much the application should start its frames later (positive) or earlier to meet the
-    /// refresh with little slack, within half a refresh interval. None before the first key.
-    pub phase_error: Option<MonoSpan>,
-    /// Present time minus content time of the newest started frame.
-    pub delay: Option<MonoSpan>,
-    /// Expected time from wake to an in-between frame being ready.
-    pub work: MonoSpan,
-    /// The same for a key that is shown as it is.
-    pub key_work: MonoSpan,
-    /// Time from there to the refresh.
-    pub margin: MonoSpan,
-    /// Events so far.
-    pub counts: PacerCounts,
-}
+/// So many frames in a row that the display throws away mean that nobody sees them.
+const DISCARDS_TO_HIDE: u32 = 16;
+/// So many of them in a row are no fault of the pacing, and widen no margin.
+const DISCARDS_TO_BLAME: u32 = 4;
+/// From one frame to the next while nobody sees them: enough to notice that somebody does again.
+const HIDDEN_INTERVAL: MonoSpan = MonoSpan::from_ms(250);
 
 /// Plans frames for one stream on one display.
 ///
@@ -93,17 +32,24 @@ pub struct PacerStatus {
 /// whichever comes first. At `wake_at`, [`start`](Self::start) the plan, make the picture, tell
 /// [`on_work`](Self::on_work), and hand it over, or drop it ([`on_dropped`](Self::on_dropped)) if
 /// it comes too late for the display: after `submit_by`, or on a timer display after `present_at`.
-/// Tell [`on_presented`](Self::on_presented) when feedback comes.
+/// Tell [`on_presented`](Self::on_presented) when feedback comes. A display that may fail to answer
+/// is watched from the frames that [`on_handed_over`](Self::on_handed_over) tells of.
 #[derive(Clone, Debug)]
 pub struct Pacer {
     interpolates: bool,
     refresh: RefreshTracker,
+    /// In place of `refresh` where the display has no grid.
+    variable: Option<VariableRefresh>,
+    flight: Flight,
     clock: ContentClock,
     cadence: KeyCadence,
     budget: Budget,
     newest: Option<MonoTime>,
     last_target: Option<MonoTime>,
     last_content: Option<MonoTime>,
+    /// Whether the window is shown, as far as its owner knows.
+    is_visible: bool,
+    discards_in_a_row: u32,
     /// What the frame that was started last shows.
     in_work: Shows,
     slack: Option<MonoSpan>,
@@ -117,12 +63,16 @@ impl Pacer {
         Self {
             interpolates: config.interpolates,
             refresh: RefreshTracker::new(config.refresh_interval, config.known_refresh),
+            variable: variable(config.refresh, config.refresh_interval),
+            flight: Flight::default(),
             clock: ContentClock::default(),
             cadence: KeyCadence::default(),
             budget: Budget::new(config.work),
             newest: None,
             last_target: None,
             last_content: None,
+            is_visible: true,
+            discards_in_a_row: 0,
             in_work: Shows::InBetween,
             slack: None,
             counts: PacerCounts::default(),
@@ -132,9 +82,19 @@ impl Pacer {
     /// A key frame has arrived, whole. `is_cut`: nothing before it relates to it.
     pub fn on_key(&mut self, content_time: MonoTime, arrived_at: MonoTime, is_cut: bool) {
         self.refresh.anchor_at(arrived_at + self.budget());
-        let first_refresh = self.first_reachable(arrived_at);
-        self.learn_slack(first_refresh - self.budget() - arrived_at);
-        match self.clock.on_key(content_time, first_refresh, self.lag_limit(), is_cut) {
+        if let Some(variable) = &mut self.variable {
+            variable.on_key(arrived_at);
+        }
+        let budget = self.budget.work_at_best(self.interval()) + self.margin() + self.offset();
+        let ready_at = arrived_at + budget;
+        let first_refresh = self.first_reachable_with(arrived_at, budget);
+        self.learn_slack(first_refresh - ready_at);
+        let offer = KeyOffer { content_time, ready_at, first_refresh, is_cut };
+        let refresh = &self.refresh;
+        // Where content times are uneven, every key meets the grid in another place anyway.
+        let can_foresee = self.variable.is_none() && self.cadence.is_even(self.interval());
+        let reachable = |ready_at| can_foresee.then(|| refresh.at_or_after(ready_at));
+        match self.clock.on_key(&offer, self.lag_limit(), reachable) {
             KeyTiming::Followed => self.cadence.on_key(content_time, first_refresh),
             KeyTiming::Stepped => {
                 self.counts.clock_steps += 1;
@@ -156,24 +116,39 @@ impl Pacer {
     /// The next frame to make, as seen at `now`. Calling it again replaces the plan; only
     /// [`start`](Self::start) takes its refresh.
     pub fn plan(&mut self, now: MonoTime) -> Plan {
+        let interval = self.interval();
+        let held = self.flight.hold_until(now, interval);
         self.refresh.anchor_at(now + self.budget());
-        let (shows, present_at) = self.next_picture(now);
-        let hand_over = self.budget.hand_over(self.refresh.interval());
-        let submit_by = (present_at - hand_over).max(now);
+        let hidden = self.last_target.filter(|_| self.is_hidden());
+        let from = now.max(held.unwrap_or(now)).max(hidden.map_or(now, |t| t + HIDDEN_INTERVAL));
+        let (shows, present_at) = self.next_picture(from);
+        let hand_over = self.budget.hand_over(interval);
+        let deadline = present_at - self.offset();
+        let submit_by = (deadline - hand_over).max(now);
         let wake_at = (present_at - self.budget_of(shows)).max(now);
-        Plan { wake_at, submit_by, present_at, content_time: self.content_time_at(present_at) }
+        let submit_from = match (&self.variable, shows) {
+            (None, _) if self.knows_phase() => deadline - interval + hand_over,
+            (Some(_), Shows::Key) => now,
+            (None, _) | (Some(_), Shows::InBetween) => submit_by,
+        };
+        let submit_from = submit_from.min(submit_by).max(now);
+        let content_time = self.content_time_at(present_at);
+        Plan { wake_at, submit_from, submit_by, present_at, content_time }
     }
 
     /// The refresh to make the next picture for: one that an in-between frame can make, or an
     /// earlier one that shows a key as it is, which takes less.
-    fn next_picture(&self, now: MonoTime) -> (Shows, MonoTime) {
-        let present_at = self.first_reachable(now);
-        let of_key = self.first_reachable_with(now, self.budget_of(Shows::Key));
+    fn next_picture(&self, from: MonoTime) -> (Shows, MonoTime) {
+        let mut present_at = self.first_reachable(from);
+        let of_key = self.first_reachable_with(from, self.budget_of(Shows::Key));
         if of_key <= present_at && self.shows_key(self.content_time_at(of_key)) {
-            (Shows::Key, of_key)
-        } else {
-            (Shows::InBetween, present_at)
+            return (Shows::Key, of_key);
         }
+        if let (Some(variable), Some(last)) = (&self.variable, self.last_target) {
+            let armed = variable.next_in_between(last, self.cadence.interval());
+            present_at = present_at.max(armed.unwrap_or(present_at));
+        }
+        (Shows::InBetween, present_at)
     }
 
     fn shows_key(&self, content_time: Option<MonoTime>) -> bool {
@@ -186,6 +161,9 @@ impl Pacer {
             return; // the same plan again: its refresh is taken already
         }
         self.last_target = Some(plan.present_at);
+        if let Some(variable) = &mut self.variable {
+            variable.on_start(plan.present_at);
+        }
         let shows_key = self.shows_key(plan.content_time);
         self.in_work = if shows_key { Shows::Key } else { Shows::InBetween };
         let delay = match self.newest {
@@ -213,16 +191,43 @@ impl Pacer {
         self.on_miss();
     }
 
-    /// A frame that was handed over will never be shown: a newer one replaced it.
-    pub fn on_discarded(&mut self) {
-        self.on_miss();
+    /// The picture of a started plan was handed to the display at `handed_over_at`, and an answer is
+    /// expected. Displays that need no watching, such as timers, are not told of here.
+    pub fn on_handed_over(&mut self, plan: &Plan, handed_over_at: MonoTime) {
+        self.flight.hand_over(plan.present_at, handed_over_at <= plan.submit_by);
+        self.debug_verify();
     }
 
-    /// The display has shown the frame that was planned for `planned` at `presented_at`.
-    pub fn on_presented(&mut self, planned: MonoTime, presented_at: MonoTime) {
-        self.refresh.on_presented(presented_at);
-        let half = self.refresh.interval().scale(1, 2);
+    /// The frame that was planned for `planned` and handed over will never be shown: a newer one
+    /// replaced it, or nobody sees the window.
+    pub fn on_discarded(&mut self, planned: MonoTime) {
+        self.flight.on_discarded(planned);
+        self.discards_in_a_row = self.discards_in_a_row.saturating_add(1);
+        if self.discards_in_a_row > DISCARDS_TO_BLAME {
+            self.counts.missed += 1;
+        } else {
+            self.on_miss();
+        }
+    }
+
+    /// The display has shown the frame that was planned for `planned` at `presented_at`; this was
+    /// heard at `heard_at`.
+    pub fn on_presented(&mut self, planned: MonoTime, presented_at: MonoTime, heard_at: MonoTime) {
+        if let Some(variable) = &mut self.variable {
+            variable.on_presented(presented_at);
+        } else {
+            self.refresh.on_presented(presented_at, self.discards_in_a_row);
+        }
+        self.discards_in_a_row = 0;
+        let interval = self.interval();
+        let half = interval.scale(1, 2);
         let late = presented_at - planned;
+        if self.variable.is_none() {
+            let refreshes = (late + half).as_ns().div_euclid(interval.as_ns().max(1));
+            self.flight.on_shown(planned, refreshes, heard_at);
+        } else {
+            self.flight.on_shown(planned, 0, heard_at);
+        }
         if late > half || late < -half {
             self.on_miss();
         } else {
@@ -232,10 +237,26 @@ impl Pacer {
         self.debug_verify();
     }
 
+    /// The display has changed its mode: another refresh interval, another kind, or another display.
+    /// What was learned of the application stays.
+    pub fn on_mode(&mut self, refresh_interval: MonoSpan, refresh: RefreshKind) {
+        self.refresh.on_mode(refresh_interval);
+        self.variable = variable(refresh, refresh_interval);
+        self.flight.on_mode();
+        self.discards_in_a_row = 0;
+        self.debug_verify();
+    }
+
+    /// Whether anybody can see what is shown. While nobody can, a frame is planned now and then.
+    pub fn on_visibility(&mut self, is_visible: bool) {
+        self.is_visible = is_visible;
+        self.discards_in_a_row = 0;
+    }
+
     /// What is known about display and application.
     #[must_use]
     pub fn status(&self) -> PacerStatus {
-        let interval = self.refresh.interval();
+        let interval = self.interval();
         let delay = |target| Some(target - self.last_content?);
         PacerStatus {
             refresh_interval: interval,
@@ -246,18 +267,65 @@ impl Pacer {
             work: self.budget.work(Shows::InBetween, interval),
             key_work: self.budget.work(Shows::Key, interval),
             margin: self.margin(),
+            display_offset: self.offset(),
+            is_rate_corrected: self.refresh.is_corrected(),
+            keeps_up: self.keeps_up(),
+            unanswered: self.flight.unanswered(),
+            feedback: self.feedback(),
             counts: PacerCounts { distrusted_timestamps: self.refresh.outliers(), ..self.counts },
+        }
+    }
+
+    fn feedback(&self) -> FeedbackState {
+        if self.is_hidden() {
+            FeedbackState::Hidden
+        } else if self.flight.is_silent() {
+            FeedbackState::Absent
+        } else if self.counts.on_target + self.counts.missed > 0 {
+            FeedbackState::Presented
+        } else {
+            FeedbackState::Awaited
+        }
+    }
+
+    fn is_hidden(&self) -> bool {
+        !self.is_visible || self.discards_in_a_row >= DISCARDS_TO_HIDE
+    }
+
+    /// Keys come as fast as the display refreshes, one for each: there is nothing to put in between.
+    fn keeps_up(&self) -> bool {
+        self.variable.is_none() && self.cadence.keeps_up_with(self.interval())
+    }
+
+    /// Time between two refreshes; on a variable display the shortest.
+    fn interval(&self) -> MonoSpan {
+        self.variable.as_ref().map_or_else(|| self.refresh.interval(), VariableRefresh::shortest)
+    }
+
+    /// Whether it is known when the display refreshes.
+    fn knows_phase(&self) -> bool {
+        self.variable.is_some() || (self.refresh.is_measured() && !self.flight.is_silent())
+    }
+
+    /// From the display's deadline for a frame to the refresh that shows it. Where the phase is
+    /// unknown a frame handed over is shown within one interval, so half of one is the best guess,
+    /// and off by no more than that.
+    fn offset(&self) -> MonoSpan {
+        if !self.knows_phase() {
+            self.interval().scale(1, 2)
+        } else {
+            self.interval().scale(self.flight.offset(), 1)
         }
     }
 
     fn on_miss(&mut self) {
         self.counts.missed += 1;
-        self.budget.on_miss(self.refresh.interval());
+        self.budget.on_miss(self.interval());
         self.debug_verify();
     }
 
     fn margin(&self) -> MonoSpan {
-        self.budget.margin(self.refresh.interval())
+        self.budget.margin(self.interval())
     }
 
     /// Time from wake to the refresh of an in-between frame.
@@ -266,7 +334,7 @@ impl Pacer {
     }
 
     fn budget_of(&self, shows: Shows) -> MonoSpan {
-        self.budget.work(shows, self.refresh.interval()) + self.margin()
+        self.budget.work(shows, self.interval()) + self.margin() + self.offset()
     }
 
     /// The first refresh that an in-between frame started at `time` can make and that is not taken.
@@ -276,6 +344,9 @@ impl Pacer {
 
     fn first_reachable_with(&self, time: MonoTime, budget: MonoSpan) -> MonoTime {
         let ready = time + budget;
+        if let Some(variable) = &self.variable {
+            return ready.max(variable.free_from(self.last_target));
+        }
         let half = self.refresh.interval().scale(1, 2);
         // Half an interval tells the next refresh from the taken one after the grid has moved.
         let free = self.last_target.map_or(MonoTime::ZERO, |taken| taken + half);
@@ -296,23 +367,35 @@ impl Pacer {
             (line - self.cadence.interval().unwrap_or_default()).min(newest)
         } else {
             let lead = self.cadence.easing(delay).eased(line - newest);
-            let same = self.refresh.interval().scale(1, SAME_AS_KEY_DIVISOR);
-            if lead < same { newest } else { newest + lead }
+            let is_same = self.keeps_up() || lead < self.same_as_key();
+            if is_same { newest } else { newest + lead }
         };
         Some(self.last_content.map_or(content, |shown| content.max(shown)))
+    }
+
+    fn same_as_key(&self) -> MonoSpan {
+        let divisor = match self.variable {
+            None => SAME_AS_KEY_DIVISOR,
+            Some(_) => SAME_AS_KEY_DIVISOR_VARIABLE,
+        };
+        self.interval().scale(1, divisor)
     }
 
     /// By how much keys may lag behind the best of them without being stuck there: half an interval
     /// of jitter, and the refresh that a key may just have missed.
     fn lag_limit(&self) -> MonoSpan {
         let interval = self.cadence.interval().unwrap_or(MonoSpan::MAX);
-        interval.scale(1, 2) + self.refresh.interval()
+        interval.scale(1, 2) + self.interval()
     }
 
     fn learn_slack(&mut self, slack: MonoSpan) {
-        let smoothed = |old: MonoSpan| old + (slack - old).scale(1, SLACK_SMOOTHING_DIVISOR);
-        let interval = self.refresh.interval();
-        self.slack = Some(self.slack.map_or(slack, smoothed).clamp(MonoSpan::ZERO, interval));
+        let interval = self.interval();
+        // On a circle: slack just above zero and just below one interval are neighbours.
+        let smoothed =
+            |old: MonoSpan| old + wrapped(slack - old, interval).scale(1, SLACK_SMOOTHING_DIVISOR);
+        let slack = self.slack.map_or(slack, smoothed);
+        let around = slack.as_ns().rem_euclid(interval.as_ns().max(1));
+        self.slack = Some(MonoSpan::from_ns(around));
     }
 
     /// Checks every invariant that the fields state.
@@ -323,10 +406,8 @@ impl Pacer {
         self.refresh.verify_invariants();
         self.clock.verify_invariants();
         self.budget.verify_invariants();
-        assert!(
-            self.margin() <= self.refresh.interval().scale(1, 2),
-            "margin above half a refresh"
-        );
+        self.flight.verify_invariants();
+        assert!(self.margin() <= self.interval().scale(1, 2), "margin above half a refresh");
         assert!(self.counts.dropped <= self.counts.missed, "a drop is a miss: {:?}", self.counts);
     }
 
@@ -335,6 +416,10 @@ impl Pacer {
             self.verify_invariants();
         }
     }
+}
+
+fn variable(refresh: RefreshKind, shortest: MonoSpan) -> Option<VariableRefresh> {
+    (refresh == RefreshKind::Variable).then(|| VariableRefresh::new(shortest))
 }
 
 /// `span` moved by whole intervals into half an interval around zero.

@@ -18,6 +18,8 @@ pub struct KeyScript {
     pub late_per_mille: u32,
     /// Keys that never arrive.
     pub missing_per_mille: u32,
+    /// Whether the application starts its frames as the pacer's phase error asks it to.
+    pub follows_pacing: bool,
     /// Times at which the application stops for a while.
     pub stall: Option<Stall>,
 }
@@ -53,6 +55,7 @@ impl KeyScript {
             arrival_jitter: MonoSpan::ZERO,
             late_per_mille: 0,
             missing_per_mille: 0,
+            follows_pacing: false,
             stall: None,
         }
     }
@@ -72,12 +75,45 @@ pub(super) struct KeySource {
     chance: SplitMix64,
     start: MonoTime,
     ticks: i64,
+    /// By how much the application has moved its frames.
+    shifted: MonoSpan,
     previous: Option<SimKey>,
+    next: SimKey,
 }
 
 impl KeySource {
     pub(super) fn new(script: KeyScript, seed: u64, start: MonoTime) -> Self {
-        Self { script, chance: SplitMix64::new(seed), start, ticks: 0, previous: None }
+        let mut source = Self {
+            script,
+            chance: SplitMix64::new(seed),
+            start,
+            ticks: 0,
+            shifted: MonoSpan::ZERO,
+            previous: None,
+            next: SimKey { content_time: start, arrived_at: start },
+        };
+        source.next = source.make();
+        source
+    }
+
+    /// The key that arrives next.
+    pub(super) fn peek(&self) -> SimKey {
+        self.next
+    }
+
+    /// Takes the key that arrives next.
+    pub(super) fn take_next(&mut self) -> SimKey {
+        let next = self.make();
+        std::mem::replace(&mut self.next, next)
+    }
+
+    pub(super) fn follows(&self) -> bool {
+        self.script.follows_pacing
+    }
+
+    /// The application starts its frames later by `span`, from the one after the next on.
+    pub(super) fn shift(&mut self, span: MonoSpan) {
+        self.shifted += span;
     }
 
     /// The end of the stall that `elapsed` falls into.
@@ -88,14 +124,10 @@ impl KeySource {
         let left = stall.length - MonoSpan::from_ns(into);
         (left > MonoSpan::ZERO).then(|| (elapsed + left, stall.kind))
     }
-}
 
-impl Iterator for KeySource {
-    type Item = SimKey;
-
-    fn next(&mut self) -> Option<SimKey> {
+    fn make(&mut self) -> SimKey {
         loop {
-            let tick = self.script.interval.scale(self.ticks, 1);
+            let tick = self.script.interval.scale(self.ticks, 1) + self.shifted;
             self.ticks += 1;
             let script = self.script;
             let mut content_time = self.start + tick + self.chance.within(script.content_jitter);
@@ -119,7 +151,7 @@ impl Iterator for KeySource {
             }
             let key = SimKey { content_time, arrived_at };
             self.previous = Some(key);
-            return Some(key);
+            return key;
         }
     }
 }
@@ -131,7 +163,8 @@ mod tests {
     const START: MonoTime = MonoTime::ZERO;
 
     fn keys(script: KeyScript, count: usize) -> Vec<SimKey> {
-        KeySource::new(script, 3, START).take(count).collect()
+        let mut source = KeySource::new(script, 3, START);
+        (0..count).map(|_| source.take_next()).collect()
     }
 
     #[test]

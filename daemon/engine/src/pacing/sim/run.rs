@@ -1,11 +1,10 @@
 //! The event loop: keys arrive, feedback arrives, the display refreshes, work ends, the pacer wakes.
 
 use std::collections::BTreeMap;
-use std::iter::Peekable;
 
-use super::display::{DisplayScript, SimDisplay};
+use super::display::{DisplayScript, SimDisplay, Slot};
 use super::keys::{KeyScript, KeySource};
-use super::measure::{Measure, ShownFrame, SimReport};
+use super::measure::{Measure, ShownFrame, SimPicture, SimReport};
 use super::policy::{Planner, Policy};
 use super::rng::SplitMix64;
 use crate::pacing::Plan;
@@ -13,6 +12,8 @@ use crate::time::{MonoSpan, MonoTime};
 
 /// When a simulation starts, from the clock's epoch: late enough for jitter to reach below it.
 const START: MonoSpan = MonoSpan::from_ms(1_000);
+/// The share of the phase error by which an application that follows it moves its next frame.
+const FOLLOW_DIVISOR: i64 = 16;
 
 /// How long synthesis takes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -44,7 +45,18 @@ pub struct Scenario {
 #[must_use]
 pub fn simulate(scenario: &Scenario, policy: Policy) -> SimReport {
     let start = MonoTime::ZERO + START;
-    Run::new(scenario, policy, start).finish(start + scenario.duration)
+    let mut run = Run::new(scenario, policy, start);
+    run.live_until(start + scenario.duration);
+    run.measure.report(run.planner.status())
+}
+
+/// Runs `policy` through `scenario`; returns what was shown, in order.
+#[must_use]
+pub fn simulate_pictures(scenario: &Scenario, policy: Policy) -> Vec<SimPicture> {
+    let start = MonoTime::ZERO + START;
+    let mut run = Run::new(scenario, policy, start);
+    run.live_until(start + scenario.duration);
+    run.measure.pictures()
 }
 
 /// What happens next. In this order where several happen at one instant.
@@ -53,26 +65,33 @@ enum Event {
     Refresh,
     Feedback,
     Key,
-    WorkDone,
+    HandOver,
     Wake,
 }
 
 struct Run {
     now: MonoTime,
-    planner: Planner,
-    keys: Peekable<KeySource>,
+    planner: Box<dyn Planner>,
+    keys: KeySource,
     display: SimDisplay,
     chance: SplitMix64,
     work: WorkScript,
     /// Index and content time of the newest key that has arrived.
     newest: Option<(usize, MonoTime)>,
-    /// The frame being made, and when it is ready.
-    in_work: Option<(MonoTime, ShownFrame, Plan)>,
-    /// The frame that the display will show next, and at which refresh.
-    pending: Option<(i64, ShownFrame)>,
+    in_work: Option<InWork>,
+    /// The frames that the display will show, by the number of the slot.
+    pending: BTreeMap<i64, (Slot, ShownFrame)>,
     /// Feedback under way, by arrival: planned and presented.
     feedback: BTreeMap<(MonoTime, i64), (MonoTime, MonoTime)>,
     measure: Measure,
+}
+
+/// A frame being made.
+#[derive(Clone, Copy, Debug)]
+struct InWork {
+    ready_at: MonoTime,
+    frame: ShownFrame,
+    plan: Plan,
 }
 
 impl Run {
@@ -81,50 +100,49 @@ impl Run {
         let display = SimDisplay::new(scenario.display, seeds.next_bits(), start);
         Self {
             now: start,
-            planner: Planner::new(policy, scenario.display.refresh_interval),
-            keys: KeySource::new(scenario.keys, seeds.next_bits(), start).peekable(),
+            planner: policy.planner(scenario.display.refresh_interval),
+            keys: KeySource::new(scenario.keys, seeds.next_bits(), start),
             chance: SplitMix64::new(seeds.next_bits()),
             work: scenario.work,
             newest: None,
             in_work: None,
-            pending: None,
+            pending: BTreeMap::new(),
             feedback: BTreeMap::new(),
-            measure: Measure::new(display.interval()),
+            measure: Measure::new(display.interval(), display.kind()),
             display,
         }
     }
 
-    fn finish(mut self, end: MonoTime) -> SimReport {
+    fn live_until(&mut self, end: MonoTime) {
         loop {
             let plan = self.planner.plan(self.now);
             let (at, event) = self.next_event(&plan);
             if at > end {
-                let status = self.planner.pacer().map(|pacer| pacer.status());
-                return self.measure.report(status);
+                return;
             }
             self.now = at;
             match event {
                 Event::Refresh => self.refresh(),
                 Event::Feedback => self.hear_feedback(),
                 Event::Key => self.take_key(),
-                Event::WorkDone => self.hand_over(),
+                Event::HandOver => self.hand_over(),
                 Event::Wake => self.begin(plan),
             }
         }
     }
 
     fn next_event(&mut self, plan: &Plan) -> (MonoTime, Event) {
-        let refresh = self.pending.map(|(index, _)| self.display.refresh_at(index));
+        let refresh = self.pending.first_key_value().map(|(_, (slot, _))| slot.at);
         let feedback = self.feedback.first_key_value().map(|(&(at, _), _)| at);
-        let key = self.keys.peek().map(|key| key.arrived_at);
-        let done = self.in_work.map(|(ready_at, ..)| ready_at);
+        let key = Some(self.keys.peek().arrived_at);
+        let done = self.in_work.map(|work| work.ready_at.max(work.plan.submit_from));
         // One frame is made at a time: no wake while another is in work.
         let wake = done.is_none().then_some(plan.wake_at);
         [
             (refresh, Event::Refresh),
             (feedback, Event::Feedback),
             (key, Event::Key),
-            (done, Event::WorkDone),
+            (done, Event::HandOver),
             (wake, Event::Wake),
         ]
         .into_iter()
@@ -134,27 +152,29 @@ impl Run {
     }
 
     fn refresh(&mut self) {
-        let Some((index, frame)) = self.pending.take() else { return };
-        let shown_at = self.display.refresh_at(index);
-        self.measure.on_shown(index, shown_at, frame);
-        if let Some(feedback) = self.display.feedback(index) {
+        let Some((_, (slot, frame))) = self.pending.pop_first() else { return };
+        self.display.show(slot);
+        self.measure.on_shown(slot.index, slot.at, frame);
+        if let Some(feedback) = self.display.feedback(slot) {
             let told = (frame.planned, feedback.presented_at);
-            self.feedback.insert((feedback.arrives_at, index), told);
+            self.feedback.insert((feedback.arrives_at, slot.index), told);
         }
     }
 
     fn hear_feedback(&mut self) {
         let Some((_, (planned, presented_at))) = self.feedback.pop_first() else { return };
-        if let Some(pacer) = self.planner.pacer() {
-            pacer.on_presented(planned, presented_at);
-        }
+        self.planner.on_presented(planned, presented_at, self.now);
     }
 
     fn take_key(&mut self) {
-        let Some(key) = self.keys.next() else { return };
+        let key = self.keys.take_next();
         let index = self.measure.on_key(key.arrived_at);
         self.newest = Some((index, key.content_time));
         self.planner.on_key(key.content_time, key.arrived_at);
+        if self.keys.follows() {
+            let error = self.planner.status().and_then(|status| status.phase_error);
+            self.keys.shift(error.unwrap_or_default().scale(1, FOLLOW_DIVISOR));
+        }
     }
 
     fn begin(&mut self, plan: Plan) {
@@ -168,32 +188,25 @@ impl Run {
         let is_real = content_time == key_time;
         let frame = ShownFrame { planned: plan.present_at, content_time, key, is_real };
         self.measure.on_started();
-        self.in_work = Some((self.now + work, frame, plan));
+        self.in_work = Some(InWork { ready_at: self.now + work, frame, plan });
     }
 
     fn hand_over(&mut self) {
-        let Some((_, frame, plan)) = self.in_work.take() else { return };
-        if let Some(pacer) = self.planner.pacer() {
-            pacer.on_work(self.now - plan.wake_at);
-            if self.now > plan.submit_by {
-                pacer.on_dropped();
-                self.measure.on_dropped();
-                return;
+        let Some(InWork { ready_at, frame, plan }) = self.in_work.take() else { return };
+        self.planner.on_work(ready_at - plan.wake_at);
+        if self.planner.drops_what_is_late() && self.now > plan.submit_by {
+            self.planner.on_dropped();
+            self.measure.on_dropped();
+            return;
+        }
+        self.planner.on_handed_over(&plan, self.now);
+        let slot = self.display.slot(self.now);
+        if let Some((_, old)) = self.pending.insert(slot.index, (slot, frame)) {
+            self.measure.on_discarded();
+            if self.display.tells_of_discard(slot) {
+                self.planner.on_discarded(old.planned);
             }
         }
-        let index = self.display.shows_at(self.now);
-        if let Some((waiting, old)) = self.pending.replace((index, frame)) {
-            if waiting == index {
-                self.measure.on_discarded();
-                if let Some(pacer) = self.planner.pacer() {
-                    pacer.on_discarded();
-                }
-            } else {
-                // Both are shown: the one that waits, first.
-                self.pending = Some((waiting, old));
-                self.refresh();
-                self.pending = Some((index, frame));
-            }
-        }
+        self.measure.on_queue(self.pending.len());
     }
 }

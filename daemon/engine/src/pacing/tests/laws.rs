@@ -5,7 +5,7 @@
 
 use proptest::prelude::*;
 
-use crate::pacing::{Pacer, PacerConfig, Plan, WorkEstimate};
+use crate::pacing::{FeedbackState, Pacer, PacerConfig, Plan, RefreshKind, WorkEstimate};
 use crate::time::{MonoSpan, MonoTime};
 
 /// What can happen.
@@ -27,6 +27,12 @@ enum Op {
     Feedback(FeedbackMode),
     /// Making a frame takes so long from now on.
     Work { us: u16 },
+    /// The display switches to another rate.
+    Mode { hz: u16 },
+    /// The window is covered, or seen again.
+    Visible(bool),
+    /// Whether the pacer is told of what is handed over.
+    Watch(bool),
     /// Time passes and nobody plans, as in a process that was stopped.
     Sleep { ms: u16 },
 }
@@ -41,6 +47,8 @@ enum FeedbackMode {
     Absent,
     /// Off by a third of a refresh and more.
     Wild,
+    /// Every frame is thrown away.
+    Discarded,
 }
 
 fn op() -> impl Strategy<Value = Op> {
@@ -50,6 +58,7 @@ fn op() -> impl Strategy<Value = Op> {
         Just(FeedbackMode::OutOfOrder),
         Just(FeedbackMode::Absent),
         Just(FeedbackMode::Wild),
+        Just(FeedbackMode::Discarded),
     ];
     prop_oneof![
         4 => (1_u16..400, -9_000_i32..9_000).prop_map(|(ms, jitter_us)| Op::Run { ms, jitter_us }),
@@ -60,6 +69,9 @@ fn op() -> impl Strategy<Value = Op> {
         1 => any::<bool>().prop_map(Op::MissVblank),
         1 => feedback.prop_map(Op::Feedback),
         1 => (0_u16..12_000).prop_map(|us| Op::Work { us }),
+        1 => (48_u16..240).prop_map(|hz| Op::Mode { hz }),
+        1 => any::<bool>().prop_map(Op::Visible),
+        1 => any::<bool>().prop_map(Op::Watch),
         1 => (1_u16..300).prop_map(|ms| Op::Sleep { ms }),
     ]
 }
@@ -67,6 +79,9 @@ fn op() -> impl Strategy<Value = Op> {
 struct World {
     pacer: Pacer,
     interpolates: bool,
+    kind: RefreshKind,
+    is_visible: bool,
+    is_watched: bool,
     now: MonoTime,
     refresh: MonoSpan,
     key_interval: MonoSpan,
@@ -77,6 +92,7 @@ struct World {
     /// Last started frame, until the application's clock is set back or a cut comes.
     started: Option<Plan>,
     last_target: MonoTime,
+    last_presented: MonoTime,
     key_since_start: bool,
     is_late: bool,
     feedback: FeedbackMode,
@@ -85,16 +101,20 @@ struct World {
 }
 
 impl World {
-    fn new(refresh_hz: f64, key_hz: f64, interpolates: bool) -> Self {
+    fn new(refresh_hz: f64, key_hz: f64, interpolates: bool, kind: RefreshKind) -> Self {
         let refresh = MonoSpan::from_hz(refresh_hz);
         Self {
             pacer: Pacer::new(PacerConfig {
                 refresh_interval: refresh,
+                refresh: kind,
                 known_refresh: None,
                 interpolates,
-                work: WorkEstimate::Measured,
+                work: WorkEstimate::Measured { first: MonoSpan::from_ms(2) },
             }),
             interpolates,
+            kind,
+            is_visible: true,
+            is_watched: false,
             now: MonoTime::from_ns(5_000_000_000),
             refresh,
             key_interval: MonoSpan::from_hz(key_hz),
@@ -103,6 +123,7 @@ impl World {
             newest: None,
             started: None,
             last_target: MonoTime::ZERO,
+            last_presented: MonoTime::ZERO,
             key_since_start: false,
             is_late: false,
             feedback: FeedbackMode::Prompt,
@@ -124,6 +145,15 @@ impl World {
             Op::MissVblank(is_late) => self.is_late = is_late,
             Op::Feedback(mode) => self.feedback = mode,
             Op::Work { us } => self.work = MonoSpan::from_us(us.into()),
+            Op::Mode { hz } => {
+                self.refresh = MonoSpan::from_hz(hz.into());
+                self.pacer.on_mode(self.refresh, self.kind);
+            }
+            Op::Visible(is_visible) => {
+                self.is_visible = is_visible;
+                self.pacer.on_visibility(is_visible);
+            }
+            Op::Watch(is_watched) => self.is_watched = is_watched,
             Op::Sleep { ms } => {
                 self.now += MonoSpan::from_ms(ms.into());
                 self.next_key = self.now;
@@ -186,6 +216,9 @@ impl World {
         if self.now + work > plan.submit_by {
             self.pacer.on_dropped();
         } else {
+            if self.is_watched {
+                self.pacer.on_handed_over(plan, self.now + work);
+            }
             self.shown(plan.present_at);
         }
         self.pacer.on_work(work);
@@ -205,6 +238,10 @@ impl World {
             FeedbackMode::Late => 3,
             FeedbackMode::OutOfOrder => self.waiting.len() % 2,
             FeedbackMode::Absent => return self.waiting.clear(),
+            FeedbackMode::Discarded => {
+                self.waiting.clear();
+                return self.pacer.on_discarded(planned);
+            }
         };
         if self.feedback == FeedbackMode::OutOfOrder {
             self.waiting.reverse();
@@ -212,7 +249,8 @@ impl World {
         for (planned, presented_at) in
             self.waiting.drain(..self.waiting.len().max(held_back) - held_back)
         {
-            self.pacer.on_presented(planned, presented_at);
+            self.last_presented = self.last_presented.max(presented_at);
+            self.pacer.on_presented(planned, presented_at, self.now);
         }
     }
 
@@ -222,16 +260,29 @@ impl World {
         prop_assert_eq!(plan, self.pacer.plan(self.now), "planning changes nothing");
         prop_assert!(plan.wake_at >= self.now, "the wake lies in the past: {:?}", plan);
         prop_assert!(plan.wake_at <= plan.submit_by && plan.submit_by <= plan.present_at);
+        prop_assert!(self.now <= plan.submit_from && plan.submit_from <= plan.submit_by);
         prop_assert!(plan.present_at > self.last_target, "a refresh was taken twice: {:?}", plan);
         let status = self.pacer.status();
-        let ready = self.now + status.work + status.margin;
+        prop_assert!(self.is_visible || status.feedback == FeedbackState::Hidden);
+        let lead = status.margin + status.display_offset;
+        let ready = self.now + status.work + lead;
         let shows_key = !self.interpolates && plan.content_time == self.newest;
         let least = if shows_key { status.work.min(status.key_work) } else { status.work };
-        let ready_at_best = self.now + least + status.margin;
+        let ready_at_best = self.now + least + lead;
         prop_assert!(plan.present_at >= ready_at_best, "not enough time: {:?}", plan);
         let half = status.refresh_interval.scale(1, 2);
-        let latest = ready.max(self.last_target + half) + status.refresh_interval;
-        prop_assert!(plan.present_at <= latest, "a refresh was passed over: {:?}", plan);
+        let mut taken_until = self.last_target + half;
+        if self.kind == RefreshKind::Variable {
+            taken_until = taken_until.max(self.last_presented);
+        }
+        let latest = ready.max(taken_until) + status.refresh_interval;
+        // A display that answers nothing, or nobody sees, is given less; on a variable one there is
+        // nothing to show at every instant, but a key goes out at once.
+        let is_slowed = status.unanswered > 1 || status.feedback == FeedbackState::Hidden;
+        let waits = self.kind == RefreshKind::Variable && !self.key_since_start;
+        if !is_slowed && !waits {
+            prop_assert!(plan.present_at <= latest, "a refresh was passed over: {:?}", plan);
+        }
         prop_assert_eq!(plan.content_time.is_some(), self.newest.is_some());
         if let Some((content, newest)) = plan.content_time.zip(self.newest) {
             if !self.interpolates {
@@ -255,9 +306,10 @@ proptest! {
         refresh_hz in prop::sample::select(vec![48.0, 59.94, 60.0, 119.88, 120.0, 144.0, 240.0]),
         key_hz in 20.0_f64..70.0,
         interpolates in prop::bool::weighted(0.2),
+        kind in prop::sample::select(vec![RefreshKind::Fixed, RefreshKind::Fixed, RefreshKind::Variable]),
         ops in prop::collection::vec(op(), 1..40),
     ) {
-        let mut world = World::new(refresh_hz, key_hz, interpolates);
+        let mut world = World::new(refresh_hz, key_hz, interpolates, kind);
         for op in &ops {
             world.apply(op)?;
         }

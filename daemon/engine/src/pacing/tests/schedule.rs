@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::Phase;
-use crate::pacing::{Pacer, PacerConfig, WorkEstimate};
+use crate::pacing::{Pacer, PacerConfig, RefreshKind, WorkEstimate};
 use crate::time::{MonoSpan, MonoTime};
 
 /// From the content time of a key to its arrival, in microseconds.
@@ -19,6 +19,7 @@ fn at(us: i64) -> MonoTime {
 fn schedule(keys: &[(i64, i64)], interval_us: i64, from: i64, to: i64) -> String {
     let mut pacer = Pacer::new(PacerConfig {
         refresh_interval: MonoSpan::from_hz(120.0),
+        refresh: RefreshKind::Fixed,
         known_refresh: Some(MonoTime::ZERO),
         interpolates: false,
         work: WorkEstimate::Constant(MonoSpan::from_ms(2)),

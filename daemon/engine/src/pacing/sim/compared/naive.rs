@@ -1,12 +1,13 @@
-//! What most frame generators do, to compare with: a timer at the announced rate, no feedback, and
-//! content time that starts at each key anew.
+//! A timer at the announced rate: no feedback, no phase.
 
+use super::super::policy::Planner;
 use crate::pacing::Plan;
 use crate::time::{MonoSpan, MonoTime};
 
-/// A timer that ticks every refresh interval, on no grid but its own.
+/// A timer that ticks every refresh interval, on no grid but its own. It counts on a frame being
+/// shown one interval after its tick.
 #[derive(Clone, Debug)]
-pub(super) struct NaiveTimer {
+pub(in super::super) struct NaiveTimer {
     interval: MonoSpan,
     next_wake: Option<MonoTime>,
     newest: Option<MonoTime>,
@@ -14,28 +15,31 @@ pub(super) struct NaiveTimer {
 }
 
 impl NaiveTimer {
-    pub(super) fn new(interval: MonoSpan) -> Self {
+    pub(in super::super) fn new(interval: MonoSpan) -> Self {
         Self { interval, next_wake: None, newest: None, frames_of_newest: 0 }
     }
+}
 
-    pub(super) fn on_key(&mut self, content_time: MonoTime) {
+impl Planner for NaiveTimer {
+    fn on_key(&mut self, content_time: MonoTime, _arrived_at: MonoTime) {
         self.newest = Some(content_time);
         self.frames_of_newest = 0;
     }
 
-    pub(super) fn plan(&mut self, now: MonoTime) -> Plan {
+    fn plan(&mut self, now: MonoTime) -> Plan {
         let wake_at = (*self.next_wake.get_or_insert(now)).max(now);
         let present_at = wake_at + self.interval;
         let ahead = self.interval.scale(self.frames_of_newest, 1);
         Plan {
             wake_at,
+            submit_from: wake_at,
             submit_by: present_at,
             present_at,
             content_time: self.newest.map(|newest| newest + ahead),
         }
     }
 
-    pub(super) fn start(&mut self, plan: &Plan) {
+    fn start(&mut self, plan: &Plan) {
         self.next_wake = Some(plan.present_at);
         self.frames_of_newest += 1;
     }

@@ -1,15 +1,21 @@
 //! `foreframe pacing`: the pacer between a simulated application and a simulated display.
 //!
 //! Reads what to simulate, runs it twice on the same chance (our pacer, and a plain timer to
-//! compare with), and reports.
+//! compare with), and reports. With `--compare` ([`compare`]) it runs the pacers of others too,
+//! through fixed traces.
+
+mod compare;
+
+use std::path::PathBuf;
 
 use foreframe_engine::MonoSpan;
 use foreframe_engine::pacing::sim::{
     DisplayScript, KeyScript, Policy, Scenario, SimReport, WorkScript, simulate,
 };
-use foreframe_engine::pacing::{PacerConfig, WorkEstimate};
+use foreframe_engine::pacing::{PacerConfig, RefreshKind, WorkEstimate};
 use serde::Serialize;
 
+use super::plot;
 use crate::options::{number, whole};
 use crate::output::Output;
 
@@ -64,6 +70,16 @@ pub struct Args {
     /// Where chance comes from, a whole number of 0 or more.
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true)]
     seed: u64,
+    /// Run this pacer and those of others through fixed traces instead, and print a table; of the
+    /// other options, `--seconds` and `--seed` apply to it.
+    #[arg(long, conflicts_with_all = [
+        "refresh", "key_rate", "jitter_ms", "arrival_jitter_percent", "content_jitter_percent",
+        "late_percent", "drift_ppm", "skipped_percent", "work_ms",
+    ])]
+    compare: bool,
+    /// With `--compare`: draw one trace to an SVG or PNG file.
+    #[arg(long, value_name = "FILE", value_parser = plot::parse_plot, requires = "compare")]
+    plot: Option<PathBuf>,
 }
 
 /// The report. Scripts read these names, so they stay as they are.
@@ -89,6 +105,8 @@ struct Row {
     missed: u64,
     dropped: u64,
     on_target_percent: f64,
+    present_error_p50_ms: f64,
+    present_error_p99_ms: f64,
     interval_5_95_ms: f64,
     content_judder: f64,
     content_judder_after_1_s: f64,
@@ -106,14 +124,18 @@ struct Percentiles {
 /// Runs the command.
 ///
 /// # Errors
-/// If standard output cannot be written.
+/// If standard output or the plot cannot be written.
 pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
+    if args.compare {
+        return compare::run(args.seconds, args.seed, args.plot.as_deref(), output);
+    }
     let scenario = scenario(args);
     let config = PacerConfig {
         refresh_interval: scenario.display.refresh_interval,
+        refresh: RefreshKind::Fixed,
         known_refresh: None,
         interpolates: false,
-        work: WorkEstimate::Measured,
+        work: WorkEstimate::Measured { first: scenario.display.refresh_interval.scale(7, 8) },
     };
     let ours = simulate(&scenario, Policy::Pacer(config));
     let naive = simulate(&scenario, Policy::NaiveTimer);
@@ -179,6 +201,8 @@ impl From<&SimReport> for Row {
             missed: report.missed,
             dropped: report.dropped,
             on_target_percent: round(report.on_target * 100.0, 3),
+            present_error_p50_ms: ms(report.present_error_p50),
+            present_error_p99_ms: ms(report.present_error_p99),
             interval_5_95_ms: ms(report.interval_5_95),
             content_judder: round(report.content_judder, 5),
             content_judder_after_1_s: round(report.steady_judder, 5),
@@ -288,7 +312,10 @@ mod tests {
     fn the_help_tells_every_range() {
         use clap::CommandFactory as _;
         let command = Line::command();
-        for argument in command.get_arguments().filter(|argument| argument.get_id() != "help") {
+        for argument in command
+            .get_arguments()
+            .filter(|argument| argument.get_action().takes_values() && argument.get_id() != "plot")
+        {
             let help = argument.get_help().unwrap().to_string();
             assert!(help.contains(" to ") || help.contains("or more"), "{argument}: {help}");
         }

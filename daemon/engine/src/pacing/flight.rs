@@ -1,0 +1,246 @@
+//! Frames that were handed over and not heard of yet, and what their answers teach.
+//!
+//! Three things: how long answers usually take, so that a display which cannot keep up is noticed
+//! and not flooded; whether the display answers at all; and how many whole refreshes it shows
+//! everything later than its deadline suggests, which some compositors do as a rule.
+//!
+//! An answer about a frame says of all older ones that theirs got lost.
+
+use std::collections::VecDeque;
+
+use super::recent::Recent;
+use crate::time::{MonoSpan, MonoTime};
+
+/// Answers that the usual delay looks back on.
+const DELAY_WINDOW: usize = 32;
+/// Delay of answers until enough were heard: what the slowest displays known take, 5 refreshes at
+/// 60 Hz.
+const FIRST_DELAY: MonoSpan = MonoSpan::from_ms(85);
+/// So many answers make a delay.
+const ANSWERS_TO_LEARN: usize = 8;
+/// So many overdue answers hold the next frame back.
+const OVERDUE_LIMIT: usize = 2;
+/// An answer that is overdue for this long never comes.
+const PATIENCE: MonoSpan = MonoSpan::from_ms(100);
+/// After so many answers in a row that never came the display is one that does not answer.
+const SILENT_LIMIT: u32 = 8;
+/// Frames that the lateness of a display looks back on.
+const LATENESS_WINDOW: usize = 16;
+/// A display shows everything at most so many refreshes late.
+const LARGEST_OFFSET: i64 = 3;
+/// Answers after a lost one for which more of them may get lost.
+const LOSS_MEMORY: u32 = 1_024;
+
+/// A frame without an answer.
+#[derive(Clone, Copy, Debug)]
+struct Waiting {
+    planned: MonoTime,
+    /// Handed over early enough for its refresh.
+    was_in_time: bool,
+}
+
+/// The frames under way.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Flight {
+    /// Oldest first.
+    waiting: VecDeque<Waiting>,
+    /// From the planned refresh to the answer being heard.
+    delays: Recent<DELAY_WINDOW>,
+    usual_delay: Option<MonoSpan>,
+    silent_in_a_row: u32,
+    answers_since_loss: Option<u32>,
+    /// Whole refreshes from the planned to the real one, newest last.
+    lateness: VecDeque<i64>,
+    /// Refreshes that the display needs from its deadline to showing a frame.
+    offset: i64,
+}
+
+impl Flight {
+    /// A frame for `planned` was handed over.
+    pub(super) fn hand_over(&mut self, planned: MonoTime, was_in_time: bool) {
+        self.waiting.push_back(Waiting { planned, was_in_time });
+    }
+
+    /// The frame for `planned` was shown `refreshes` after it; this was heard at `heard_at`.
+    pub(super) fn on_shown(&mut self, planned: MonoTime, refreshes: i64, heard_at: MonoTime) {
+        let Some(was_in_time) = self.take(planned) else { return };
+        self.delays.push(heard_at - planned);
+        if self.delays.len() >= ANSWERS_TO_LEARN {
+            self.usual_delay = self.delays.percentile(95);
+        }
+        if was_in_time {
+            self.learn_offset(refreshes);
+        }
+    }
+
+    /// The frame for `planned` will never be shown.
+    pub(super) fn on_discarded(&mut self, planned: MonoTime) {
+        self.take(planned);
+    }
+
+    /// Nothing that was learned from the display holds any more.
+    pub(super) fn on_mode(&mut self) {
+        *self = Self { silent_in_a_row: self.silent_in_a_row, ..Self::default() };
+    }
+
+    /// Refreshes from the display's deadline to the one that shows a frame, beyond the first.
+    pub(super) fn offset(&self) -> i64 {
+        self.offset
+    }
+
+    /// Frames without an answer.
+    pub(super) fn unanswered(&self) -> usize {
+        self.waiting.len()
+    }
+
+    /// Whether the display has stopped to answer, or never did.
+    pub(super) fn is_silent(&self) -> bool {
+        self.silent_in_a_row >= SILENT_LIMIT
+    }
+
+    /// Gives up waiting for what is overdue for too long, and says until when the next frame has to
+    /// wait if too many answers are overdue at `now`. A display that never answered holds nothing.
+    pub(super) fn hold_until(&mut self, now: MonoTime, interval: MonoSpan) -> Option<MonoTime> {
+        let usual = self.usual_delay.unwrap_or(FIRST_DELAY);
+        // Where answers get lost, one that is missing may still be told of by those after it.
+        let tolerance = interval.scale(if self.answers_since_loss.is_some() { 3 } else { 1 }, 1);
+        let due = |frame: &Waiting| frame.planned + usual + tolerance;
+        while self.waiting.front().is_some_and(|oldest| due(oldest) + PATIENCE <= now) {
+            self.waiting.pop_front();
+            self.silent_in_a_row = self.silent_in_a_row.saturating_add(1);
+        }
+        self.usual_delay.filter(|_| !self.is_silent())?;
+        let overdue = self.waiting.iter().filter(|frame| due(frame) <= now).count();
+        let oldest = self.waiting.front()?;
+        (overdue >= OVERDUE_LIMIT).then(|| due(oldest) + PATIENCE)
+    }
+
+    /// Takes out the frame for `planned` and all older ones; whether it was handed over in time.
+    fn take(&mut self, planned: MonoTime) -> Option<bool> {
+        let position = self.waiting.iter().position(|frame| frame.planned == planned)?;
+        self.silent_in_a_row = 0;
+        self.answers_since_loss = match (position, self.answers_since_loss) {
+            (1.., _) => Some(0),
+            (_, Some(answers)) if answers < LOSS_MEMORY => Some(answers + 1),
+            _ => None,
+        };
+        let frame = self.waiting.drain(..=position).next_back()?;
+        Some(frame.was_in_time)
+    }
+
+    fn learn_offset(&mut self, refreshes: i64) {
+        self.lateness.push_back(refreshes);
+        if self.lateness.len() < LATENESS_WINDOW {
+            return;
+        }
+        let (least, most) = self
+            .lateness
+            .iter()
+            .fold((i64::MAX, i64::MIN), |(least, most), &late| (least.min(late), most.max(late)));
+        self.lateness.pop_front();
+        let change = if most < 0 { most } else { least.max(0) };
+        let offset = (self.offset + change).clamp(0, LARGEST_OFFSET);
+        if offset != self.offset {
+            self.offset = offset;
+            self.lateness.clear();
+        }
+    }
+
+    pub(super) fn verify_invariants(&self) {
+        assert!((0..=LARGEST_OFFSET).contains(&self.offset), "offset out of bounds: {self:?}");
+        assert!(self.lateness.len() < LATENESS_WINDOW, "lateness was not judged: {self:?}");
+        let planned = self.waiting.iter().map(|frame| frame.planned);
+        assert!(planned.is_sorted(), "frames out of order: {self:?}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const INTERVAL: MonoSpan = MonoSpan::from_ms(10);
+
+    fn at(ms: i64) -> MonoTime {
+        MonoTime::ZERO + MonoSpan::from_ms(ms)
+    }
+
+    /// A flight whose frames, one each 10 ms, were shown `late` refreshes late and told of 1 ms on.
+    fn flown(frames: i64, late: i64) -> Flight {
+        let mut flight = Flight::default();
+        for frame in 1..=frames {
+            flight.hand_over(at(frame * 10), true);
+            flight.on_shown(at(frame * 10), late, at((frame + late) * 10 + 1));
+            flight.verify_invariants();
+        }
+        flight
+    }
+
+    #[test]
+    fn a_display_that_stops_to_answer_holds_the_next_frame_and_then_is_called_silent() {
+        let mut flight = flown(20, 0);
+        flight.hand_over(at(210), true);
+        assert_eq!(flight.hold_until(at(225), INTERVAL), None, "one answer may be late");
+        flight.hand_over(at(220), true);
+        assert_eq!(flight.hold_until(at(231), INTERVAL), Some(at(321)));
+        assert_eq!(flight.hold_until(at(320), INTERVAL), Some(at(321)));
+        assert_eq!(flight.hold_until(at(321), INTERVAL), None);
+        for frame in 0..i64::from(SILENT_LIMIT) {
+            flight.hand_over(at(330 + frame * 10), true);
+        }
+        assert_eq!(flight.hold_until(at(2_000), INTERVAL), None);
+        assert!(flight.is_silent());
+        flight.hand_over(at(2_010), true);
+        flight.on_shown(at(2_010), 0, at(2_011));
+        assert!(!flight.is_silent());
+    }
+
+    #[test]
+    fn answers_that_are_always_late_are_waited_for_and_do_not_hold_anything() {
+        let mut flight = Flight::default();
+        for frame in 1..100 {
+            flight.hand_over(at(frame * 10), true);
+            if frame > 8 {
+                flight.on_shown(at((frame - 8) * 10), 0, at(frame * 10));
+            }
+            assert_eq!(flight.hold_until(at(frame * 10), INTERVAL), None, "frame {frame}");
+        }
+        assert_eq!(flight.unanswered(), 8);
+    }
+
+    #[test]
+    fn an_answer_clears_all_older_frames_and_one_that_is_unknown_none() {
+        let mut flight = flown(10, 0);
+        (11..15).for_each(|frame| flight.hand_over(at(frame * 10), true));
+        flight.on_discarded(at(777));
+        assert_eq!(flight.unanswered(), 4);
+        flight.on_shown(at(130), 0, at(131));
+        assert_eq!(flight.unanswered(), 1);
+    }
+
+    #[test]
+    fn a_display_that_shows_everything_a_refresh_late_has_an_offset_of_one() {
+        assert_eq!(flown(LATENESS_WINDOW as i64 - 1, 1).offset(), 0);
+        let mut flight = flown(LATENESS_WINDOW as i64, 1);
+        assert_eq!(flight.offset(), 1);
+        for frame in 100..200 {
+            flight.hand_over(at(frame * 10), true);
+            flight.on_shown(at(frame * 10), i64::from(frame % 5 == 0), at(frame * 10 + 1));
+        }
+        assert_eq!(flight.offset(), 1, "a miss now and then is none");
+        for frame in 200..220 {
+            flight.hand_over(at(frame * 10), true);
+            flight.on_shown(at(frame * 10), -1, at(frame * 10 + 1));
+        }
+        assert_eq!(flight.offset(), 0);
+    }
+
+    #[test]
+    fn frames_that_we_handed_over_late_say_nothing_about_the_display() {
+        let mut flight = Flight::default();
+        for frame in 1..100 {
+            flight.hand_over(at(frame * 10), false);
+            flight.on_shown(at(frame * 10), 1, at(frame * 10 + 11));
+        }
+        assert_eq!(flight.offset(), 0);
+    }
+}
