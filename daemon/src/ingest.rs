@@ -4,7 +4,9 @@
 //! The protocol has checked every field by itself; here is checked what needs the key before
 //! ([`KeyOrder`]) and that the pixels are there in full ([`key_input`]).
 
-use foreframe_engine::{self as engine, KeyInput, MonoTime, PlaneInput, format as convention};
+use foreframe_engine::{
+    self as engine, KeyInput, MonoTime, Pixels, PlaneInput, ReadPixels, format as convention,
+};
 use foreframe_protocol as protocol;
 use foreframe_protocol::{PlaneDescriptor, PlaneKind, Submit};
 
@@ -173,14 +175,23 @@ impl KeyOrder {
     }
 }
 
-/// A key frame as the engine takes it. `bytes` gives the pixels of a plane, rows without padding.
+/// Where the pixels of a plane of a key are.
+#[derive(Clone, Copy, Debug)]
+pub enum PlaneSource<'a> {
+    /// In memory of our own, rows without padding.
+    Packed(&'a [u8]),
+    /// In the slot that the client submitted, laid out as it described.
+    InSlot(&'a dyn ReadPixels),
+}
+
+/// A key frame as the engine takes it. `source` gives the pixels of a plane.
 ///
 /// # Errors
 /// If a plane is not declared by the stream, or not all of its pixels are there.
 pub fn key_input<'a>(
     format: &protocol::StreamFormat,
     submit: &Submit,
-    bytes: impl Fn(PlaneKind) -> Option<&'a [u8]>,
+    source: impl Fn(PlaneKind) -> Option<PlaneSource<'a>>,
 ) -> Result<KeyInput<'a>, IngestError> {
     let plane = |kind| {
         let Some(descriptor) = submit.planes.get(kind) else { return Ok(None) };
@@ -188,7 +199,8 @@ pub fn key_input<'a>(
             expected: "the planes that the stream declares",
             found: "another one",
         })?;
-        plane_input(kind, descriptor, bytes_per_pixel, bytes(kind).unwrap_or(&[])).map(Some)
+        let source = source(kind).unwrap_or(PlaneSource::Packed(&[]));
+        plane_input(kind, descriptor, bytes_per_pixel, source).map(Some)
     };
     Ok(KeyInput {
         index: submit.key_index,
@@ -208,17 +220,22 @@ fn plane_input<'a>(
     kind: PlaneKind,
     descriptor: &PlaneDescriptor,
     bytes_per_pixel: u32,
-    bytes: &'a [u8],
+    source: PlaneSource<'a>,
 ) -> Result<PlaneInput<'a>, IngestError> {
     let PlaneDescriptor { width, height, valid, jitter, .. } = *descriptor;
-    let stride = width.saturating_mul(bytes_per_pixel);
-    let expected = u64::from(stride) * u64::from(height);
-    if bytes.len() as u64 != expected {
-        return Err(IngestError::PlaneBytes { plane: kind, expected, found: bytes.len() as u64 });
+    let row = width.saturating_mul(bytes_per_pixel);
+    let (pixels, stride) = match source {
+        PlaneSource::Packed(bytes) => (Pixels::Bytes(bytes), row),
+        PlaneSource::InSlot(reader) => (Pixels::Reader(reader), descriptor.stride),
+    };
+    let expected = u64::from(stride) * u64::from(height.saturating_sub(1)) + u64::from(row);
+    let found = pixels.byte_count();
+    if found != expected {
+        return Err(IngestError::PlaneBytes { plane: kind, expected, found });
     }
     let protocol::Rect { x, y, width: valid_width, height: valid_height } = valid;
     let valid = engine::Rect { x, y, width: valid_width, height: valid_height };
-    Ok(PlaneInput { bytes, width, height, stride, valid, jitter })
+    Ok(PlaneInput { pixels, width, height, stride, valid, jitter })
 }
 
 fn camera(camera: protocol::Camera) -> engine::Camera {
@@ -277,7 +294,8 @@ mod tests {
         let format = protocol::StreamFormat::rgba8(3, 2);
         let pixels = [0; 28];
         for (count, is_whole) in [(24, true), (23, false), (28, false), (0, false)] {
-            let input = key_input(&format, &submit(0, 0), |_| Some(&pixels[..count]));
+            let input =
+                key_input(&format, &submit(0, 0), |_| Some(PlaneSource::Packed(&pixels[..count])));
             assert_eq!(input.is_ok(), is_whole, "{count} bytes");
         }
     }
@@ -288,7 +306,8 @@ mod tests {
         let mut submit = submit(0, 0);
         let size = PlaneSize { width: 1, height: 1 };
         submit.planes.set(PlaneKind::Depth, Some(PlaneDescriptor::packed(64, size, 4)));
-        let error = key_input(&format, &submit, |_| Some(&[0; 24])).unwrap_err();
+        let error =
+            key_input(&format, &submit, |_| Some(PlaneSource::Packed(&[0; 24]))).unwrap_err();
         assert!(matches!(error, IngestError::Planes { .. }), "{error}");
     }
 }

@@ -18,8 +18,8 @@ use foreframe_engine::format::{
     MotionFormat, MotionUnit,
 };
 use foreframe_engine::{
-    ColorPlane, Engine, EngineConfig, KeyInput, Method, MonoSpan, MonoTime, PlaneInput, Rect,
-    StreamFormat,
+    ColorPlane, Engine, EngineConfig, KeyInput, Method, MonoSpan, MonoTime, Pixels, PlaneInput,
+    Rect, StreamFormat,
 };
 
 const KEYS: u64 = 24;
@@ -99,7 +99,7 @@ fn time(
     }
     let planes = planes(width, height, still);
     let plane = |bytes, width: u32, height: u32, bytes_per_pixel: u32| PlaneInput {
-        bytes,
+        pixels: Pixels::Bytes(bytes),
         width,
         height,
         stride: width * bytes_per_pixel,

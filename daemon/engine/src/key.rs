@@ -16,11 +16,49 @@ pub struct Camera {
     pub projection: [f32; 16],
 }
 
-/// One plane of a key frame, as bytes in the declared format.
+/// Where the pixels of a plane are.
+#[derive(Clone, Copy, Debug)]
+pub enum Pixels<'a> {
+    /// In bytes that stay as they are.
+    Bytes(&'a [u8]),
+    /// In memory that somebody else may write to meanwhile.
+    Reader(&'a dyn ReadPixels),
+}
+
+/// Reads pixels out of memory that may change: every byte that is used is copied before.
+///
+/// The engine reads each row once, some rows of depth twice where it works out the camera's
+/// motion, on several threads at once.
+pub trait ReadPixels: Sync + std::fmt::Debug {
+    /// Bytes from the first pixel to the end of the last.
+    fn byte_count(&self) -> u64;
+
+    /// Copies bytes from `offset` on, all of them before the end.
+    fn read(&self, offset: u64, out: &mut [u8]);
+}
+
+impl Pixels<'_> {
+    /// Bytes from the first pixel to the end of the last.
+    #[must_use]
+    pub fn byte_count(&self) -> u64 {
+        match self {
+            Self::Bytes(bytes) => bytes.len() as u64,
+            Self::Reader(reader) => reader.byte_count(),
+        }
+    }
+}
+
+impl<'a> From<&'a [u8]> for Pixels<'a> {
+    fn from(bytes: &'a [u8]) -> Self {
+        Self::Bytes(bytes)
+    }
+}
+
+/// One plane of a key frame, in the declared format.
 #[derive(Clone, Copy, Debug)]
 pub struct PlaneInput<'a> {
-    /// Pixels; row `y` starts at `y * stride`.
-    pub bytes: &'a [u8],
+    /// Pixels; row `y` starts at byte `y * stride`.
+    pub pixels: Pixels<'a>,
     /// Columns of the plane.
     pub width: u32,
     /// Rows of the plane.

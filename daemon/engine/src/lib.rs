@@ -37,7 +37,7 @@ pub use color::ColorPlane;
 pub use decode::DecodeError;
 pub use engine::{Engine, EngineConfig, FrameReport, KeyReport};
 pub use format::StreamFormat;
-pub use key::{Camera, KeyFrame, KeyInput, PlaneInput};
+pub use key::{Camera, KeyFrame, KeyInput, Pixels, PlaneInput, ReadPixels};
 pub use method::Method;
 pub use phase::Phase;
 pub use plane::{Plane, Rect};

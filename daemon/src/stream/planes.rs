@@ -1,7 +1,12 @@
-//! Private copies of the planes of a key, made once, read by engine and recorder alike.
+//! The planes of a key on their way out of its slot.
+//!
+//! Each byte is copied out of shared memory once before it is used. The engine does that itself,
+//! row by row, while it converts ([`SlotPlanes`]); where a recorder needs the planes as they came,
+//! they are copied whole, and the copy is read by engine and recorder alike ([`PlaneCopier`]).
 
 use std::sync::Arc;
 
+use foreframe_engine::ReadPixels;
 use foreframe_protocol::memory::ReadOnlyPool;
 use foreframe_protocol::{Error, PlaneKind, PlaneMap, StreamFormat, Submit};
 
@@ -38,6 +43,62 @@ impl KeyPlanes {
             self.present |= kind.bit();
         }
         Ok(())
+    }
+}
+
+/// The planes of one key, still in its slot.
+#[derive(Debug)]
+pub struct SlotPlanes<'a> {
+    planes: PlaneMap<SlotPlane<'a>>,
+}
+
+#[derive(Debug)]
+struct SlotPlane<'a> {
+    pool: &'a ReadOnlyPool,
+    offset: u64,
+    bytes: u64,
+}
+
+impl<'a> SlotPlanes<'a> {
+    /// The planes of a key, of which the slot starts at `slot_offset`.
+    ///
+    /// # Errors
+    /// If a plane leaves the pool, which a checked submission does not.
+    pub fn new(
+        format: &StreamFormat,
+        submit: &Submit,
+        pool: &'a ReadOnlyPool,
+        slot_offset: u64,
+    ) -> Result<Self, Error> {
+        let mut planes = PlaneMap::default();
+        for (kind, plane) in submit.planes.iter() {
+            let Some(bytes_per_pixel) = format.bytes_per_pixel(kind) else { continue };
+            let row = u64::from(plane.width) * u64::from(bytes_per_pixel);
+            let rows_before = u64::from(plane.height.saturating_sub(1));
+            let bytes = rows_before * u64::from(plane.stride) + row;
+            let offset = slot_offset.saturating_add(plane.offset);
+            pool.check_range(offset, bytes)?;
+            planes.set(kind, Some(SlotPlane { pool, offset, bytes }));
+        }
+        Ok(Self { planes })
+    }
+
+    /// Reads the pixels of a plane; None where the key has none.
+    #[must_use]
+    pub fn get(&self, kind: PlaneKind) -> Option<&dyn ReadPixels> {
+        self.planes.get(kind).map(|plane| plane as &dyn ReadPixels)
+    }
+}
+
+impl ReadPixels for SlotPlane<'_> {
+    fn byte_count(&self) -> u64 {
+        self.bytes
+    }
+
+    fn read(&self, offset: u64, out: &mut [u8]) {
+        self.pool
+            .copy_to(self.offset.saturating_add(offset), out)
+            .expect("the whole plane was found to lie in the pool");
     }
 }
 

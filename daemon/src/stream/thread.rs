@@ -11,9 +11,10 @@ use std::thread::{self, JoinHandle};
 
 use calloop::channel::Sender;
 use foreframe_engine::pacing::Plan;
-use foreframe_engine::{MonoSpan, MonoTime};
+use foreframe_engine::{KeyReport, MonoSpan, MonoTime};
 use foreframe_protocol::{
-    CreateStream, ErrorCode, ErrorMessage, OutputFrame, OutputKind, Pacing, Presented, Statistics,
+    CreateStream, Error, ErrorCode, ErrorMessage, OutputFrame, OutputKind, Pacing, Presented,
+    Statistics,
 };
 use thread_priority::{
     RealtimeThreadSchedulePolicy, ThreadPriority, ThreadPriorityValue, ThreadSchedulePolicy,
@@ -23,11 +24,11 @@ use tracing::{debug, error, info, trace, warn};
 
 use super::core::{CoreConfig, DroppedFrame, FrameKind, FrameOutcome, PresentedFrame, StreamCore};
 use super::mailbox::{Mailbox, Submission, Taken};
-use super::planes::PlaneCopier;
+use super::planes::{PlaneCopier, SlotPlanes};
 use super::{FromStream, StreamEvent};
 use crate::clock::{self, Alarm, Woken};
 use crate::gpu::Gpus;
-use crate::ingest;
+use crate::ingest::{self, IngestError, PlaneSource};
 use crate::recorder::StreamRecorder;
 use crate::sink::worker::SinkWorker;
 
@@ -197,36 +198,46 @@ impl StreamThread {
 
     fn take_key(&mut self, submission: &Submission) {
         let started_at = clock::now();
-        let Submission { submit, arrived_at, pool, slot_offset } = submission;
-        let format = &self.parts.create.format;
-        let copied = self.copier.copy(format, submit, pool, *slot_offset);
+        let taken = self.read_key(submission);
         if let Some(slot) = self.parts.mailbox.release() {
             self.send(StreamEvent::SlotCopied(slot));
         }
-        let planes = match copied {
-            Ok(planes) => planes,
-            Err(error) => return self.refuse(ErrorMessage::new(&error, false, None)),
+        let report = match taken {
+            Ok(report) => report,
+            Err(error) => return self.refuse(error),
         };
-        if let Some(recorder) = &mut self.parts.recorder {
-            recorder.offer(submit, *arrived_at, &planes);
-        }
-        let input = match ingest::key_input(format, submit, |kind| planes.get(kind)) {
-            Ok(input) => input,
-            Err(error) => return self.refuse(plane_error(error.parts())),
-        };
-        match self.core.on_key(&input, clock::now) {
-            Ok(report) => trace!(key = submit.key_index, work = %report.work, "key taken in"),
-            Err(error) => {
-                let parts = ("planes".to_owned(), "what the stream declares".to_owned());
-                return self.refuse(plane_error((parts.0, parts.1, error.to_string())));
-            }
-        }
+        let Submission { submit, arrived_at, .. } = submission;
+        trace!(key = submit.key_index, work = %report.work, "key taken in");
         self.key_work = clock::now() - started_at;
         self.repeats_in_a_row = 0;
         self.owes_picture = true;
         self.unshown =
             Some(Unshown { key_index: submit.key_index, received_at_ns: arrived_at.as_ns() });
         self.send_pacing(submit.key_index);
+    }
+
+    /// Hands a key out of its slot to the engine, and to the recorder if there is one.
+    fn read_key(&mut self, submission: &Submission) -> Result<KeyReport, ErrorMessage> {
+        let Submission { submit, arrived_at, pool, slot_offset } = submission;
+        let format = &self.parts.create.format;
+        let outside = |error: Error| ErrorMessage::new(&error, false, None);
+        let wrong = |error: IngestError| plane_error(error.parts());
+        let taken = if let Some(recorder) = &mut self.parts.recorder {
+            let copied = self.copier.copy(format, submit, pool, *slot_offset);
+            let planes = copied.map_err(outside)?;
+            recorder.offer(submit, *arrived_at, &planes);
+            let source = |kind| planes.get(kind).map(PlaneSource::Packed);
+            let input = ingest::key_input(format, submit, source).map_err(wrong)?;
+            self.core.on_key(&input, clock::now)
+        } else {
+            let planes = SlotPlanes::new(format, submit, pool, *slot_offset).map_err(outside)?;
+            let source = |kind| planes.get(kind).map(PlaneSource::InSlot);
+            let input = ingest::key_input(format, submit, source).map_err(wrong)?;
+            self.core.on_key(&input, clock::now)
+        };
+        taken.map_err(|error| {
+            plane_error(("planes".into(), "what the stream declares".into(), error.to_string()))
+        })
     }
 
     fn refuse(&mut self, message: ErrorMessage) {

@@ -42,6 +42,15 @@ impl ReadOnlyPool {
         self.mapping.len() == 0
     }
 
+    /// Checks that `len` bytes from `offset` on lie in the pool, as they then always will.
+    ///
+    /// # Errors
+    /// [`Error::Memory`] if they do not.
+    pub fn check_range(&self, offset: u64, len: u64) -> Result<()> {
+        let len = usize::try_from(len).unwrap_or(usize::MAX);
+        self.range(offset, len).map(|_| ())
+    }
+
     /// Copies `out.len()` bytes from `offset` on. What the writer changes meanwhile arrives in
     /// part, and harms nothing but the picture.
     ///

@@ -12,7 +12,7 @@ use foreframe_protocol::{PlaneDescriptor, PlaneKind, Submit};
 use foreframed::capture::{
     Capture, CaptureInfo, CapturedPlane, PIXELS_PER_DEGREE, PlaneInfo, ReadAt,
 };
-use foreframed::ingest;
+use foreframed::ingest::{self, PlaneSource};
 
 use super::{Frame, FrameHead, OwnedPlane, Recording, Wanted};
 
@@ -167,7 +167,9 @@ impl<S: ReadAt> Recording for CaptureRecording<S> {
         }
         let format = &self.capture.streams()[self.stream].format;
         let bytes = |kind| captured.plane(kind).map(|plane: &CapturedPlane| &plane.bytes[..]);
-        Ok(owned(&ingest::key_input(format, &submit, bytes)?))
+        let source = |kind| bytes(kind).map(PlaneSource::Packed);
+        let input = ingest::key_input(format, &submit, source)?;
+        Ok(frame_of(&input, bytes))
     }
 }
 
@@ -200,9 +202,10 @@ impl<S: ReadAt> CaptureRecording<S> {
     }
 }
 
-fn owned(input: &KeyInput<'_>) -> Frame {
-    let plane = |plane: PlaneInput<'_>| OwnedPlane {
-        bytes: plane.bytes.to_vec(),
+/// The frame of `input`, whose pixels are in `bytes`.
+fn frame_of<'a>(input: &KeyInput<'_>, bytes: impl Fn(PlaneKind) -> Option<&'a [u8]>) -> Frame {
+    let plane = |kind: PlaneKind, plane: PlaneInput<'_>| OwnedPlane {
+        bytes: bytes(kind).unwrap_or_default().to_vec(),
         width: plane.width,
         height: plane.height,
         stride: plane.stride,
@@ -214,9 +217,9 @@ fn owned(input: &KeyInput<'_>) -> Frame {
         content_time: input.content_time,
         motion_from: input.motion_from,
         is_cut: input.is_cut,
-        color: plane(input.color),
-        depth: input.depth.map(plane),
-        motion: input.motion.map(plane),
+        color: plane(PlaneKind::Color, input.color),
+        depth: input.depth.map(|depth| plane(PlaneKind::Depth, depth)),
+        motion: input.motion.map(|motion| plane(PlaneKind::Motion, motion)),
         camera: input.camera,
         motion_from_camera: input.motion_from_camera,
     }

@@ -14,7 +14,7 @@ pub(crate) mod memory;
 pub mod plan;
 
 use foreframe_engine::key::Camera;
-use foreframe_engine::{KeyInput, MonoTime, PlaneInput, Rect, StreamFormat};
+use foreframe_engine::{KeyInput, MonoTime, Pixels, PlaneInput, Rect, StreamFormat};
 
 /// What a frame has, without its pixels.
 #[derive(Clone, PartialEq, Debug)]
@@ -51,7 +51,7 @@ impl OwnedPlane {
     #[must_use]
     pub fn as_input(&self) -> PlaneInput<'_> {
         PlaneInput {
-            bytes: &self.bytes,
+            pixels: Pixels::Bytes(&self.bytes),
             width: self.width,
             height: self.height,
             stride: self.stride,

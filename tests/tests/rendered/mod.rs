@@ -48,7 +48,7 @@ impl Rendered {
             let pixels = size.width as usize * size.height as usize;
             let bytes: &[u8] = bytes;
             PlaneInput {
-                bytes,
+                pixels: bytes.into(),
                 width: size.width,
                 height: size.height,
                 stride: (bytes.len() / pixels * size.width as usize) as u32,

@@ -3,6 +3,7 @@
 //! Half floats are clamped on entry: NaN to 0, infinity to the largest finite half of its sign.
 
 use rayon::ThreadPool;
+use zerocopy::{FromBytes, IntoBytes};
 
 use super::geometry::CheckedPlane;
 use crate::bands::for_each_row;
@@ -39,12 +40,12 @@ pub(super) fn decode_color(
     target.reset(format.color, format.width, format.height);
     match target {
         ColorPlane::Rgba8(target) => {
-            read(pool, plane, target, |bytes: [u8; 4]| Rgba8(u32::from_le_bytes(bytes)));
+            read_words(pool, plane, target, |Rgba8(word)| Rgba8(u32::from_le(word)));
         }
         ColorPlane::Rgb10a2(target) => {
-            read(pool, plane, target, |bytes: [u8; 4]| Rgb10a2(u32::from_le_bytes(bytes)));
+            read_words(pool, plane, target, |Rgb10a2(word)| Rgb10a2(u32::from_le(word)));
         }
-        ColorPlane::Rgba16f(target) => read(pool, plane, target, ordered_from_bytes),
+        ColorPlane::Rgba16f(target) => read_halves(pool, plane, target),
     }
     if !stretch {
         return image;
@@ -63,21 +64,41 @@ pub(super) fn decode_color(
     image
 }
 
-fn read<T: Texel, const N: usize>(
+/// Reads a plane that is kept as it comes, but for the order of its bytes.
+fn read_words<T: Texel + FromBytes + IntoBytes>(
     pool: &ThreadPool,
     plane: &CheckedPlane<'_>,
     target: &mut Plane<T>,
-    texel: impl Fn([u8; N]) -> T + Sync,
+    from_little_endian: impl Fn(T) -> T + Sync,
 ) {
     for_each_row(
         pool,
         target,
         #[inline(always)]
         |y, row| {
-            let (pixels, _) = plane.row(y).as_chunks::<N>();
-            for (to, from) in row.iter_mut().zip(pixels) {
-                *to = texel(*from);
+            plane.read_row(y, row.as_mut_bytes());
+            for texel in row {
+                *texel = from_little_endian(*texel);
             }
+        },
+    );
+}
+
+fn read_halves(pool: &ThreadPool, plane: &CheckedPlane<'_>, target: &mut Plane<OrderedRgba16>) {
+    for_each_row(
+        pool,
+        target,
+        #[inline(always)]
+        |y, row| {
+            plane.with_row(
+                y,
+                #[inline(always)]
+                |bytes| {
+                    for (texel, pixel) in row.iter_mut().zip(bytes.as_chunks().0) {
+                        *texel = ordered_from_bytes(*pixel);
+                    }
+                },
+            );
         },
     );
 }

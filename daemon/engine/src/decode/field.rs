@@ -132,17 +132,22 @@ impl<'a> FieldInput<'a> {
                     keys,
                     #[inline(always)]
                     |y, out| {
-                        let row = plane.valid_row(u32::from(rows[y as usize]));
-                        if is_own {
-                            let (texels, _) = row.as_chunks::<$bytes>();
-                            for (key, texel) in out.iter_mut().zip(texels) {
-                                *key = to_key.key(stored_depth($format, texel, 0));
-                            }
-                            return;
-                        }
-                        for (key, &x) in out.iter_mut().zip(columns) {
-                            *key = to_key.key(stored_depth($format, row, usize::from(x)));
-                        }
+                        plane.with_valid_row(
+                            u32::from(rows[y as usize]),
+                            #[inline(always)]
+                            |row| {
+                                if is_own {
+                                    let (texels, _) = row.as_chunks::<$bytes>();
+                                    for (key, texel) in out.iter_mut().zip(texels) {
+                                        *key = to_key.key(stored_depth($format, texel, 0));
+                                    }
+                                    return;
+                                }
+                                for (key, &x) in out.iter_mut().zip(columns) {
+                                    *key = to_key.key(stored_depth($format, row, usize::from(x)));
+                                }
+                            },
+                        );
                     },
                 )
             };
@@ -184,19 +189,24 @@ impl<'a> FieldInput<'a> {
                     out,
                     #[inline(always)]
                     |y, out| {
-                        let row = plane.valid_row(u32::from(rows[y as usize]));
-                        if is_own {
-                            let (texels, _) = row.as_chunks::<$bytes>();
-                            for (displacement, texel) in out.iter_mut().zip(texels) {
-                                let [dx, dy] = stored_motion($format, texel, 0);
-                                *displacement = [dx * factor[0], dy * factor[1]];
-                            }
-                            return;
-                        }
-                        for (displacement, &x) in out.iter_mut().zip(table) {
-                            let [dx, dy] = stored_motion($format, row, usize::from(x));
-                            *displacement = [dx * factor[0], dy * factor[1]];
-                        }
+                        plane.with_valid_row(
+                            u32::from(rows[y as usize]),
+                            #[inline(always)]
+                            |row| {
+                                let pixels = |[dx, dy]: [f32; 2]| [dx * factor[0], dy * factor[1]];
+                                if is_own {
+                                    let (texels, _) = row.as_chunks::<$bytes>();
+                                    for (displacement, texel) in out.iter_mut().zip(texels) {
+                                        *displacement = pixels(stored_motion($format, texel, 0));
+                                    }
+                                    return;
+                                }
+                                for (displacement, &x) in out.iter_mut().zip(table) {
+                                    let stored = stored_motion($format, row, usize::from(x));
+                                    *displacement = pixels(stored);
+                                }
+                            },
+                        );
                     },
                 )
             };
@@ -228,15 +238,21 @@ impl<'a> FieldInput<'a> {
             out,
             #[inline(always)]
             |y, out| {
-                let row = plane.valid_row(u32::from(rows[y as usize]));
                 let v = (y as f32 + 0.5 + self.jitter[1]) / cells[1];
-                for (x, displacement) in out.iter_mut().enumerate() {
-                    let u = (x as f32 + 0.5 + self.jitter[0]) / cells[0];
-                    let stored = stored_depth(convention.format, row, usize::from(table[x]));
-                    let z = clip_depth(convention, self.projection, stored);
-                    let [dx, dy] = motion.displacement(u, v, z);
-                    *displacement = [displacement[0] + dx, displacement[1] + dy];
-                }
+                plane.with_valid_row(
+                    u32::from(rows[y as usize]),
+                    #[inline(always)]
+                    |row| {
+                        for (x, displacement) in out.iter_mut().enumerate() {
+                            let u = (x as f32 + 0.5 + self.jitter[0]) / cells[0];
+                            let stored =
+                                stored_depth(convention.format, row, usize::from(table[x]));
+                            let z = clip_depth(convention, self.projection, stored);
+                            let [dx, dy] = motion.displacement(u, v, z);
+                            *displacement = [displacement[0] + dx, displacement[1] + dy];
+                        }
+                    },
+                );
             },
         );
         Ok(())

@@ -1,14 +1,19 @@
-//! Checks that a plane's numbers describe bytes that are there.
+//! Checks that a plane's numbers describe bytes that are there, and reads its rows.
+//!
+//! Rows of memory that may change are copied, row by row, into a buffer that stays in a core's
+//! cache: what is converted from there has been copied once.
+
+use std::cell::RefCell;
 
 use super::error::{DecodeError, PlaneName};
 use crate::format::StreamFormat;
-use crate::key::PlaneInput;
+use crate::key::{Pixels, PlaneInput};
 use crate::plane::Rect;
 
-/// A plane whose geometry has been checked: every row of `valid` lies inside `bytes`.
+/// A plane whose geometry has been checked: every row of `valid` lies inside `pixels`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CheckedPlane<'a> {
-    bytes: &'a [u8],
+    pixels: Pixels<'a>,
     stride: usize,
     bytes_per_pixel: usize,
     pub(super) width: u32,
@@ -33,7 +38,7 @@ impl<'a> CheckedPlane<'a> {
             return Err(DecodeError::Stride { plane, expected: row, found: input.stride });
         }
         let expected = u64::from(height - 1) * u64::from(input.stride) + row;
-        let found = input.bytes.len() as u64;
+        let found = input.pixels.byte_count();
         if found < expected {
             return Err(DecodeError::TooFewBytes { plane, expected, found });
         }
@@ -44,7 +49,7 @@ impl<'a> CheckedPlane<'a> {
             return Err(DecodeError::Jitter { plane, found: input.jitter });
         }
         Ok(Self {
-            bytes: input.bytes,
+            pixels: input.pixels,
             stride: input.stride as usize,
             bytes_per_pixel: bytes_per_pixel as usize,
             width,
@@ -72,14 +77,49 @@ impl<'a> CheckedPlane<'a> {
         })
     }
 
-    /// The bytes of row `y` of the whole plane, without padding.
-    pub(super) fn row(&self, y: u32) -> &'a [u8] {
-        &self.bytes[y as usize * self.stride..][..self.width as usize * self.bytes_per_pixel]
+    /// Copies row `y` of the whole plane, without padding, into `out`, which is as long.
+    #[inline(always)]
+    pub(super) fn read_row(&self, y: u32, out: &mut [u8]) {
+        let start = y as usize * self.stride;
+        match self.pixels {
+            Pixels::Bytes(bytes) => out.copy_from_slice(&bytes[start..][..out.len()]),
+            Pixels::Reader(reader) => reader.read(start as u64, out),
+        }
     }
 
-    /// The bytes of row `y` of the valid rectangle.
-    pub(super) fn valid_row(&self, y: u32) -> &'a [u8] {
-        let start = self.valid.x as usize * self.bytes_per_pixel;
-        &self.row(self.valid.y + y)[start..][..self.valid.width as usize * self.bytes_per_pixel]
+    /// Calls `work` with the bytes of row `y` of the whole plane, without padding.
+    #[inline(always)]
+    pub(super) fn with_row(&self, y: u32, work: impl FnOnce(&[u8])) {
+        self.with_bytes(y as usize * self.stride, self.width, work);
     }
+
+    /// Calls `work` with the bytes of row `y` of the valid rectangle.
+    #[inline(always)]
+    pub(super) fn with_valid_row(&self, y: u32, work: impl FnOnce(&[u8])) {
+        let row = (self.valid.y + y) as usize * self.stride;
+        let start = row + self.valid.x as usize * self.bytes_per_pixel;
+        self.with_bytes(start, self.valid.width, work);
+    }
+
+    #[inline(always)]
+    fn with_bytes(&self, start: usize, pixels: u32, work: impl FnOnce(&[u8])) {
+        let length = pixels as usize * self.bytes_per_pixel;
+        match self.pixels {
+            Pixels::Bytes(bytes) => work(&bytes[start..][..length]),
+            Pixels::Reader(reader) => {
+                // Taken and put back, as a closure given to the thread's storage is not made for
+                // AVX2.
+                let mut row = ROW.take();
+                row.resize(length, 0);
+                reader.read(start as u64, &mut row);
+                work(&row);
+                ROW.set(row);
+            }
+        }
+    }
+}
+
+thread_local! {
+    /// Kept from row to row.
+    static ROW: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
 }

@@ -64,7 +64,7 @@ mod tests {
 
     fn plane(bytes: &[u8], bytes_per_pixel: u32) -> PlaneInput<'_> {
         PlaneInput {
-            bytes,
+            pixels: bytes.into(),
             width: 4,
             height: 2,
             stride: 4 * bytes_per_pixel,

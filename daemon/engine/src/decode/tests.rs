@@ -1,12 +1,14 @@
 //! One scene, told in every convention, must decode to the same field.
 
+use std::sync::atomic::{AtomicU32, Ordering};
+
 use super::*;
 use crate::color::{ColorFormat, OrderedRgba16, half_to_ordered};
 use crate::format::{
     DepthConvention, DepthFormat, MotionConvention, MotionDirection, MotionFormat, MotionUnit,
     ValidRectUse,
 };
-use crate::key::{Camera, PlaneInput, Velocity};
+use crate::key::{Camera, Pixels, PlaneInput, ReadPixels, Velocity};
 use crate::testing::pool;
 use crate::time::{MonoSpan, MonoTime};
 
@@ -125,7 +127,7 @@ fn tell(depth: DepthConvention, far: f64, with_camera: bool, motion: MotionConve
 
 fn plane(bytes: &[u8], width: u32, height: u32) -> PlaneInput<'_> {
     PlaneInput {
-        bytes,
+        pixels: Pixels::Bytes(bytes),
         width,
         height,
         stride: bytes.len() as u32 / height,
@@ -388,7 +390,7 @@ fn strides_and_valid_rectangles_do_not_change_what_is_read() {
     let ((depth, depth_stride), (motion, motion_stride)) =
         (surround(&told.depth, 4), surround(&told.motion, 8));
     let inside = |bytes, stride| PlaneInput {
-        bytes,
+        pixels: Pixels::Bytes(bytes),
         width: WIDTH + 5,
         height: HEIGHT + 3,
         stride,
@@ -520,7 +522,7 @@ fn bad_numbers_are_refused_with_what_was_expected_and_what_was_found() {
             depth(input).stride = u32::MAX;
         }),
         ("colour plane: expected at least 512 bytes, found 511", &|_, input| {
-            input.color.bytes = &COLOR[1..];
+            input.color.pixels = Pixels::Bytes(&COLOR[1..]);
         }),
         (
             "depth plane: expected a valid rectangle inside 16x8 pixels, found 16x8 at 1, 0",
@@ -564,6 +566,57 @@ fn bad_numbers_are_refused_with_what_was_expected_and_what_was_found() {
         spoil(&mut format, &mut input);
         let error = decode(&format, &input).expect_err(message);
         assert_eq!(error.to_string(), *message);
+    }
+}
+
+/// Memory that somebody else writes to: counts how often each byte is read.
+#[derive(Debug)]
+struct Shared<'a> {
+    bytes: &'a [u8],
+    reads: Vec<AtomicU32>,
+}
+
+impl<'a> Shared<'a> {
+    fn new(bytes: &'a [u8]) -> Self {
+        Self { bytes, reads: bytes.iter().map(|_| AtomicU32::new(0)).collect() }
+    }
+}
+
+impl ReadPixels for Shared<'_> {
+    fn byte_count(&self) -> u64 {
+        self.bytes.len() as u64
+    }
+
+    fn read(&self, offset: u64, out: &mut [u8]) {
+        let range = offset as usize..offset as usize + out.len();
+        out.copy_from_slice(&self.bytes[range.clone()]);
+        for reads in &self.reads[range] {
+            reads.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}
+
+#[test]
+fn what_is_read_out_of_shared_memory_is_read_once_and_gives_the_same_key() {
+    let told = tell(DEPTH, FAR, true, MOTION);
+    let pixels: Vec<u8> = (0..WIDTH * HEIGHT * 8).map(|i| (i % 113) as u8).collect();
+    for color in [ColorFormat::Rgba8, ColorFormat::Rgb10a2, ColorFormat::Rgba16f] {
+        let format = StreamFormat { color, ..told.format };
+        let color = &pixels[..(WIDTH * HEIGHT * color.bytes_per_pixel()) as usize];
+        let planes = [color, &told.depth, &told.motion].map(Shared::new);
+        let mut input = KeyInput { color: plane(color, WIDTH, HEIGHT), ..input(&told) };
+        let (expected, _) = decode(&format, &input).unwrap();
+        let [color, depth, motion] = planes.each_ref().map(|plane| Pixels::Reader(plane));
+        input.color.pixels = color;
+        input.depth.as_mut().unwrap().pixels = depth;
+        input.motion.as_mut().unwrap().pixels = motion;
+        let (found, _) = decode(&format, &input).unwrap();
+        assert_eq!(found.color, expected.color);
+        assert_eq!(found.depth, expected.depth);
+        assert_eq!(found.velocity, expected.velocity);
+        for reads in planes.iter().flat_map(|plane| &plane.reads) {
+            assert_eq!(reads.load(Ordering::Relaxed), 1, "reads of a byte");
+        }
     }
 }
 

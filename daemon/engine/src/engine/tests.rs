@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::format::{CameraMotion, MotionConvention, MotionDirection, MotionFormat, MotionUnit};
-use crate::key::PlaneInput;
+use crate::key::{Pixels, PlaneInput};
 use crate::plane::Rect;
 
 const SIZE: u32 = 16;
@@ -31,7 +31,7 @@ fn push(engine: &mut Engine, at_ms: i64, seed: u8) -> Result<KeyReport, DecodeEr
     let motion: Vec<u8> =
         (0..256).flat_map(|_| [3.0_f32, 0.0]).flat_map(f32::to_le_bytes).collect();
     let plane = |bytes, bytes_per_pixel: u32| PlaneInput {
-        bytes,
+        pixels: Pixels::Bytes(bytes),
         width: SIZE,
         height: SIZE,
         stride: SIZE * bytes_per_pixel,

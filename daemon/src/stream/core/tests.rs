@@ -3,11 +3,10 @@
 use std::cell::Cell;
 use std::num::NonZeroUsize;
 
-use foreframe_engine::PlaneInput;
-use foreframe_engine::Rect;
 use foreframe_engine::format::{
     CameraMotion, MotionConvention, MotionDirection, MotionFormat, MotionUnit,
 };
+use foreframe_engine::{Pixels, PlaneInput, Rect};
 
 use super::*;
 
@@ -65,7 +64,7 @@ impl Rig {
         let vector = [3.0_f32, 0.0].map(f32::to_le_bytes).concat();
         let motion = vector.repeat(256);
         let plane = |bytes, bytes_per_pixel: u32| PlaneInput {
-            bytes,
+            pixels: Pixels::Bytes(bytes),
             width: SIZE,
             height: SIZE,
             stride: SIZE * bytes_per_pixel,
