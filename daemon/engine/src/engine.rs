@@ -224,15 +224,23 @@ impl Engine {
         let started_at = (self.config.timer)();
         let key = self.newest.as_ref()?;
         let phase = match key.motion_span() {
+            // Back from the newest key.
+            Some(span) if self.config.method == Method::Voxel => {
+                Phase::at(key.content_time, content_time, span)
+            }
             Some(span) => Phase::at(content_time, key.content_time, span),
             None => Phase::ZERO,
         };
         out.reset(key.color.format(), key.color.width(), key.color.height());
         let (newest_at, previous) = (key.content_time, self.previous.as_ref());
         let shown = match (self.config.method, previous) {
-            (Method::Blend, Some(older)) if content_time <= older.content_time => Some(older),
-            (Method::Blend, Some(_)) if content_time < newest_at => None,
-            (Method::Hold | Method::Blend, _) => Some(key),
+            (method, Some(older))
+                if method.interpolates() && content_time <= older.content_time =>
+            {
+                Some(older)
+            }
+            (method, Some(_)) if method.interpolates() && content_time < newest_at => None,
+            (Method::Hold | Method::Blend | Method::Voxel, _) => Some(key),
             _ if phase == Phase::ZERO => Some(key),
             _ => None,
         };
@@ -244,6 +252,8 @@ impl Engine {
             let frame = FrameInput { method, phase, newest: key, previous, map };
             self.backend.make(&self.pool, &frame, out);
         }
+        // What lies before the newest key has no position after it.
+        let phase = if self.config.method.interpolates() { Phase::ZERO } else { phase };
         Some(FrameReport { key_index: key.index, phase, work: (self.config.timer)() - started_at })
     }
 }

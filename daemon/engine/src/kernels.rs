@@ -51,6 +51,7 @@ pub const KERNELS: &[Kernel] = &[
     exact("warp/resolve", "classify", Some(&CLASSIFY)),
     exact("warp/linear", "warp_linear", Some(&LINEAR)),
     exact("warp/grid", "warp_grid", Some(&GRID)),
+    exact("warp/voxel", "warp_voxel", None),
 ];
 
 #[cfg(test)]

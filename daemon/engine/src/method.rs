@@ -10,6 +10,9 @@ pub enum Method {
     Hold,
     /// Mean of the two keys around the content time. Interpolates.
     Blend,
+    /// Both keys around the content time, filtered along the motion between them (Falchetto et al.
+    /// 2007). Interpolates.
+    Voxel,
     /// The newest key sampled backwards through its own motion field: the plain baseline.
     Gather,
     /// Grid warp snapped to motion discontinuities (Didyk et al. 2010, section 6).
@@ -29,9 +32,10 @@ pub enum Method {
 
 impl Method {
     /// Every method, in the order in which tables list them.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Hold,
         Self::Blend,
+        Self::Voxel,
         Self::Gather,
         Self::Grid,
         Self::Linear,
@@ -47,6 +51,7 @@ impl Method {
         match self {
             Self::Hold => "hold",
             Self::Blend => "blend",
+            Self::Voxel => "voxel",
             Self::Gather => "gather",
             Self::Grid => "grid",
             Self::Linear => "linear",
@@ -62,15 +67,23 @@ impl Method {
     #[must_use]
     pub const fn warp(self) -> Self {
         match self {
-            Self::Hold | Self::Blend | Self::Gather | Self::Grid | Self::Linear => self,
+            Self::Hold | Self::Blend | Self::Voxel | Self::Gather | Self::Grid | Self::Linear => {
+                self
+            }
             Self::Global | Self::Affine | Self::Quadratic | Self::World => Self::Linear,
         }
+    }
+
+    /// Whether GPUs make its frames, where a stream has one; the CPU makes those of all others.
+    #[must_use]
+    pub const fn runs_on_gpus(self) -> bool {
+        !matches!(self, Self::Voxel)
     }
 
     /// Whether it needs the key after the content time, and so shows everything one interval late.
     #[must_use]
     pub const fn interpolates(self) -> bool {
-        matches!(self, Self::Blend)
+        matches!(self, Self::Blend | Self::Voxel)
     }
 }
 

@@ -39,6 +39,13 @@ impl Phase {
         Self((phase.clamp(0.0, 4.0) * scale).round() as u16)
     }
 
+    /// From a Q12 integer, clamped to the range.
+    #[must_use]
+    #[expect(clippy::cast_sign_loss, reason = "clamped to 0..=16384 before the cast")]
+    pub(crate) fn from_q12(q12: i32) -> Self {
+        Self(q12.clamp(0, i32::from(Self::MAX.0)) as u16)
+    }
+
     /// As a real number, exactly.
     #[must_use]
     pub fn as_f64(self) -> f64 {

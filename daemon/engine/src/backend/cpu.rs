@@ -12,12 +12,14 @@ use crate::warp::blend::blend;
 use crate::warp::gather::warp_gather;
 use crate::warp::grid::{GridScratch, warp_grid};
 use crate::warp::linear::{LinearScratch, warp_linear};
+use crate::warp::voxel::{Between, VoxelScratch, warp_voxel};
 
 /// Buffers of the steps, kept from frame to frame.
 #[derive(Debug, Default)]
 pub struct CpuBackend {
     grid: GridScratch,
     linear: LinearScratch,
+    voxel: VoxelScratch,
     effective: Plane<Velocity>,
 }
 
@@ -28,6 +30,9 @@ impl CpuBackend {
         if method == Method::Linear && !key.velocity.data().is_empty() {
             self.linear.take_key(pool, key);
         }
+        if method == Method::Voxel && !key.velocity.data().is_empty() {
+            self.voxel.take_key(pool, key);
+        }
     }
 
     /// Makes a picture after the key that was taken last into `out`, which has the size and format of the keys.
@@ -35,6 +40,10 @@ impl CpuBackend {
         let FrameInput { method, phase, newest: key, previous, map } = *frame;
         match (method, previous) {
             (Method::Blend, Some(older)) => blend(pool, &older.color, &key.color, out),
+            (Method::Voxel, Some(older)) => {
+                let between = Between { older, newer: key, phase };
+                warp_voxel(pool, &between, map, &mut self.voxel, out);
+            }
             (Method::Gather, _) => warp_gather(pool, key, map, phase, out),
             (Method::Grid, _) => warp_grid(key, phase, out, &mut self.grid, pool),
             (Method::Linear, _) => {

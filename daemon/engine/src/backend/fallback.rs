@@ -47,6 +47,9 @@ impl Backend {
 
     /// Runs on `gpu` from the next key on, in a stream that has had none.
     pub(crate) fn use_gpu(&mut self, gpu: &Arc<Gpu>, format: ColorFormat, method: Method) {
+        if !method.runs_on_gpus() {
+            return;
+        }
         match GpuBackend::new(gpu, format, method) {
             Ok(backend) => {
                 self.gpu = Some(backend);

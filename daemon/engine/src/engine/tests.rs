@@ -130,8 +130,11 @@ mod on_gpus {
                 on_gpu.use_gpu(&gpu);
                 let frames = shown(&mut on_gpu, |_| ());
                 assert_eq!(frames, shown(&mut engine(method), |_| ()), "{method}");
-                let expected =
-                    BackendStatus { name: format!("gpu:{}", gpu.name()), fell_back: None };
+                let name = match method.runs_on_gpus() {
+                    true => format!("gpu:{}", gpu.name()),
+                    false => "cpu".to_owned(),
+                };
+                let expected = BackendStatus { name, fell_back: None };
                 assert_eq!(on_gpu.backend(), &expected, "{method}");
             }
         }

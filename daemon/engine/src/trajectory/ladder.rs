@@ -96,9 +96,12 @@ impl Ladder {
             Method::Affine => Rung::Affine,
             Method::Quadratic => Rung::Quadratic,
             Method::World => Rung::World(CameraOrder::Constant),
-            Method::Hold | Method::Blend | Method::Gather | Method::Grid | Method::Linear => {
-                return None;
-            }
+            Method::Hold
+            | Method::Blend
+            | Method::Voxel
+            | Method::Gather
+            | Method::Grid
+            | Method::Linear => return None,
         };
         Some(Self {
             rung,

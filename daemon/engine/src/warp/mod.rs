@@ -10,6 +10,7 @@ pub mod linear;
 pub mod resolve;
 pub mod sample;
 pub mod scatter;
+pub mod voxel;
 
 #[cfg(test)]
 mod laws;
