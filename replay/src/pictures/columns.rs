@@ -71,7 +71,8 @@ pub fn columns(sheet: &ColumnSheet) -> Result<Drawing, PictureError> {
 }
 
 fn entry_width(name: &str) -> f32 {
-    17.0 + text_width(name, LABEL.size) + 18.0
+    // The reader's font may be wider than the one that is measured.
+    17.0 + 1.12 * text_width(name, LABEL.size) + 16.0
 }
 
 #[cfg(test)]

@@ -186,7 +186,8 @@ pub fn small_multiples(sheet: &Sheet) -> Result<Drawing, PictureError> {
 fn legend_places(sheet: &Sheet, width: f32) -> Vec<[f32; 2]> {
     let (mut x, mut y) = (MARGIN, 0.0);
     let place = |(name, _): &(String, Look)| {
-        let entry = 33.0 + text_width(name, LABEL.size) + 22.0;
+        // The reader's font may be wider than the one that is measured.
+        let entry = 33.0 + 1.12 * text_width(name, LABEL.size) + 20.0;
         if x + entry > width - MARGIN && x > MARGIN {
             (x, y) = (MARGIN, y + LEGEND_ROW);
         }
@@ -246,8 +247,12 @@ impl Axes<'_> {
             }
             Across::Log => AcrossAxis::Log(LogAxis::over(across(), [left, right]).expect(any)),
         };
-        let up = points(panel).map(|point| point[1]);
-        let up = LinearAxis::over(up, [bottom, top]).expect(any);
+        // Whole marks fit in.
+        let up = || points(panel).map(|point| point[1]);
+        let (low, high) = (up().fold(f64::MAX, f64::min), up().fold(f64::MIN, f64::max));
+        let room = if high > low { 0.04 * (high - low) } else { 0.0 };
+        let up = LinearAxis::over([low - room, high + room].into_iter(), [bottom, top]);
+        let up = up.expect(any);
         Placed { across, up, left, top, right, bottom }
     }
 }
@@ -334,7 +339,7 @@ struct Labels {
 impl Labels {
     /// Where the baseline of a label of the point `at` begins. None where there is no room.
     fn place(&mut self, label: &str, [x, y]: [f32; 2]) -> Option<[f32; 2]> {
-        let width = text_width(label, 12.5);
+        let width = 1.12 * text_width(label, 12.5);
         let places = [
             [x + 9.0, y + 4.0],
             [x - 9.0 - width, y + 4.0],

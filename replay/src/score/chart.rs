@@ -7,7 +7,7 @@
 use super::metrics::MAX_PSNR_DB;
 use super::report::{MeanScore, MethodScore, Report};
 use crate::draw::Drawing;
-use crate::draw::palette::MUTED;
+use crate::draw::palette::{GRID, MUTED};
 use crate::pictures::{
     Across, Line, Look, Mark, Panel, PictureError, Point, Sheet, small_multiples,
 };
@@ -48,7 +48,7 @@ pub fn chart(report: &Report) -> Result<Drawing, PictureError> {
             label: Some(label(dot)),
             is_ringed: dot.name == "auto",
         };
-        let front = Look { color: MUTED, dash: None, width: 1.2, mark: Mark::Disc };
+        let front = Look { color: GRID, dash: None, width: 5.0, mark: Mark::Disc };
         Panel {
             title: format!("{title}: {up}"),
             across: "ms per in-between frame".to_owned(),

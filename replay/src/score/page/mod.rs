@@ -16,9 +16,9 @@ use crate::pictures::{
 };
 
 /// Pictures on a page, truths and predictions together: a few megabytes.
-const MOST_PICTURES: usize = 240;
+const MOST_PICTURES: usize = 96;
 /// Frames of one capture to flip through, at least and at most.
-const FRAMES: [usize; 2] = [2, 9];
+const FRAMES: [usize; 2] = [2, 6];
 /// Errors in the viewer are shown this many times as large.
 const ERROR_GAIN: u32 = 4;
 /// Highest PSNR that is drawn over time, dB.

@@ -41,8 +41,8 @@ fn the_page_needs_nothing_from_elsewhere_and_says_what_it_leaves_out() {
 
 #[test]
 fn frames_are_kept_for_few_captures_more_than_for_many() {
-    assert_eq!([1, 4, 100].map(|captures| frames_to_keep(captures, 11)), [9, 5, 2]);
-    assert_eq!(frames_to_keep(0, 0), 9);
+    assert_eq!([1, 2, 100].map(|captures| frames_to_keep(captures, 11)), [6, 4, 2]);
+    assert_eq!(frames_to_keep(0, 0), 6);
 }
 
 /// What the viewer says and the colours of a pixel inside the patch after `keys` were pressed.
