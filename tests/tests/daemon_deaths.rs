@@ -134,7 +134,10 @@ fn a_folder_that_others_can_enter_is_refused_in_one_line() {
 #[test]
 fn a_missing_parent_folder_is_told_in_one_line() {
     let folder = private_folder();
-    assert_one_line(&folder.path().join("no/such/daemon.sock"), "no");
+    assert_one_line(
+        &folder.path().join("no/such/daemon.sock"),
+        "expected a folder that can be made for the socket, found ",
+    );
 }
 
 fn assert_one_line(socket: &Path, expected: &str) {
@@ -142,10 +145,7 @@ fn assert_one_line(socket: &Path, expected: &str) {
     assert_eq!(status.code(), Some(1), "{errors}");
     let lines: Vec<_> = errors.lines().filter(|line| line.starts_with("foreframed: ")).collect();
     assert_eq!(lines.len(), 1, "{errors}");
-    assert!(
-        lines[0].contains(expected) && lines[0].contains("expected") || lines[0].contains(expected),
-        "{errors}"
-    );
+    assert!(lines[0].contains(expected), "{errors}");
 }
 
 #[test]

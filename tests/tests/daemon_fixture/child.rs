@@ -8,6 +8,7 @@ use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::Path;
 use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
 
+use foreframe_engine::MonoSpan;
 use foreframed::{Args, clock};
 use rustix::process::{Pid, Signal, kill_process};
 
@@ -125,10 +126,16 @@ impl ChildProcess {
         self.child.wait().unwrap();
     }
 
-    /// Waits for its end: how it ended, and what it wrote to standard error.
+    /// Waits for its end, a minute at most: how it ended, and what it wrote to standard error.
     pub(crate) fn end(&mut self) -> (ExitStatus, String) {
-        let status = self.child.wait().unwrap();
-        (status, self.errors())
+        let patience = clock::now() + MonoSpan::from_ms(60_000);
+        loop {
+            if let Some(status) = self.child.try_wait().unwrap() {
+                return (status, self.errors());
+            }
+            assert!(clock::now() < patience, "it goes on");
+            std::thread::yield_now();
+        }
     }
 
     fn errors(&mut self) -> String {
