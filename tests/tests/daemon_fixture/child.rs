@@ -99,7 +99,7 @@ impl ChildProcess {
     /// A daemon that listens.
     pub(crate) fn daemon(socket: &Path, record: Option<&Path>) -> Self {
         let mut child = Self::spawn(Role::Daemon, socket, record);
-        let patience = clock::now() + foreframe_engine::MonoSpan::from_ms(60_000);
+        let patience = clock::now() + MonoSpan::from_ms(60_000);
         while foreframe_protocol::socket::Channel::connect(socket).is_err() {
             assert!(clock::now() < patience, "the daemon does not listen");
             assert!(child.child.try_wait().unwrap().is_none(), "{}", child.errors());
