@@ -189,7 +189,7 @@ impl Engine {
                 self.scratch.decode.hand_displacement(&mut key);
             }
             let older = self.newest.as_ref().filter(|_| !key.is_cut);
-            ladder.take_key(&self.pool, &mut key, older);
+            ladder.take_key(&self.pool, &mut key, older, self.previous.as_ref());
         }
         if !key.velocity.data().is_empty() {
             let cells = [key.velocity.width(), key.velocity.height()];

@@ -4,7 +4,8 @@
 //! and knows no wire format, so the live daemon, the replay tool and the tests run the same code.
 //!
 //! Flow of a key frame: [`decode`] converts what the application declared to the one convention
-//! inside; [`trajectory`] dilates motion and quantises it; of an in-between frame: [`warp`]
+//! inside; [`evidence`] judges what was predicted of it; [`trajectory`] says how its surfaces go on
+//! and quantises that; of an in-between frame: [`warp`]
 //! scatters or gathers along the trajectories, [`fill`] repairs what no source pixel lands on.
 //! [`engine`] runs these steps in order, [`pacing`] says for which content time.
 //!
@@ -16,6 +17,7 @@ pub mod bands;
 pub mod color;
 pub mod decode;
 pub mod engine;
+pub mod evidence;
 pub mod field;
 pub mod fill;
 pub mod format;

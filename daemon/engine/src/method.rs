@@ -28,6 +28,9 @@ pub enum Method {
     Quadratic,
     /// As `linear`, seen by a camera that goes on along its own path; needs depth and cameras.
     World,
+    /// The ladder: for every surface the cheapest of `hold`, `global`, `linear`, `affine`,
+    /// `quadratic` and `world` that the last keys have shown to be good enough.
+    Auto,
 }
 
 impl Method {
@@ -43,6 +46,7 @@ impl Method {
         Self::Affine,
         Self::Quadratic,
         Self::World,
+        Self::Auto,
     ];
 
     /// Name on the command line, in reports and in JSON.
@@ -59,6 +63,7 @@ impl Method {
             Self::Affine => "affine",
             Self::Quadratic => "quadratic",
             Self::World => "world",
+            Self::Auto => "auto",
         }
     }
 
@@ -70,7 +75,9 @@ impl Method {
             Self::Hold | Self::Blend | Self::Voxel | Self::Gather | Self::Grid | Self::Linear => {
                 self
             }
-            Self::Global | Self::Affine | Self::Quadratic | Self::World => Self::Linear,
+            Self::Global | Self::Affine | Self::Quadratic | Self::World | Self::Auto => {
+                Self::Linear
+            }
         }
     }
 

@@ -20,10 +20,15 @@ use super::quadratic::Quadratic;
 use super::rung::Rung;
 use super::world::World;
 use crate::bands::for_each_row_of_two;
+use crate::evidence::{Evidence, Predictions};
 use crate::key::{Acceleration, KeyFrame, Velocity};
 use crate::method::Method;
 use crate::plane::Plane;
 use crate::time::MonoTime;
+
+/// Own motion, pixels per span and axis, up to which a surface moves with the world: more than the
+/// motion and depth of real engines are off.
+const STILL_PX: f32 = 0.25;
 
 /// What the rungs need of one key beside its planes.
 #[derive(Clone, Debug, Default)]
@@ -75,14 +80,27 @@ impl Models {
     }
 }
 
+/// Who says which rung a cell takes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Choice {
+    /// The method: this one everywhere.
+    Always(Rung),
+    /// `world` everywhere; evidence says in which order the camera goes on.
+    World,
+    /// Evidence.
+    Evidence,
+}
+
 /// What one stream knows from key to key.
 #[derive(Debug)]
 pub struct Ladder {
-    rung: Rung,
+    choice: Choice,
     /// Pixels per degree of visual angle, where motion that no eye can follow is damped.
     pixels_per_degree: Option<f32>,
     path: CameraPath,
     models: Models,
+    spare: Models,
+    evidence: Evidence,
     velocity: Plane<Velocity>,
     acceleration: Plane<Acceleration>,
 }
@@ -91,53 +109,112 @@ impl Ladder {
     /// For streams of `method`; None where it takes the motion field as it is.
     #[must_use]
     pub fn new(method: Method, pixels_per_degree: Option<f32>) -> Option<Self> {
-        let rung = match method {
-            Method::Global => Rung::Global,
-            Method::Affine => Rung::Affine,
-            Method::Quadratic => Rung::Quadratic,
-            Method::World => Rung::World(CameraOrder::Constant),
+        let choice = match method {
+            Method::Global => Choice::Always(Rung::Global),
+            Method::Affine => Choice::Always(Rung::Affine),
+            Method::Quadratic => Choice::Always(Rung::Quadratic),
+            Method::World => Choice::World,
+            Method::Auto => Choice::Evidence,
             Method::Hold
             | Method::Blend
             | Method::Voxel
             | Method::Gather
             | Method::Grid
-            | Method::Linear => return None,
+            | Method::Linear => {
+                return None;
+            }
         };
         Some(Self {
-            rung,
+            choice,
             pixels_per_degree,
             path: CameraPath::default(),
             models: Models::default(),
+            spare: Models::default(),
+            evidence: Evidence::default(),
             velocity: Plane::default(),
             acceleration: Plane::default(),
         })
     }
 
+    /// What the keys so far have shown.
+    #[must_use]
+    pub fn evidence(&self) -> &Evidence {
+        &self.evidence
+    }
+
     /// Gives `key` its trajectories. It was decoded with its displacement; `older` is the key before
-    /// it, unless this one is a cut.
-    pub fn take_key(&mut self, pool: &ThreadPool, key: &mut KeyFrame, older: Option<&KeyFrame>) {
+    /// it, unless this one is a cut, and `before` the one before that.
+    pub fn take_key(
+        &mut self,
+        pool: &ThreadPool,
+        key: &mut KeyFrame,
+        older: Option<&KeyFrame>,
+        before: Option<&KeyFrame>,
+    ) {
         if key.is_cut {
             self.path.cut();
+            self.evidence.cut();
         }
         if let Some(camera) = key.camera {
             self.path.push(Pose { time: key.content_time, camera });
         }
         if key.displacement.data().is_empty() {
+            self.evidence.cut();
             return;
         }
-        self.prepare(pool, key);
+        let models = self.prepare(pool, key);
+        if !matches!(self.choice, Choice::Always(_)) {
+            let followed = older.filter(|older| key.motion_from == Some(older.content_time));
+            self.weigh(pool, key, &models, followed, before);
+        }
+        self.spare = std::mem::replace(&mut self.models, models);
         self.fill(pool, key, older);
     }
 
-    /// Works out what the rung needs of `key`.
-    fn prepare(&mut self, pool: &ThreadPool, key: &KeyFrame) {
-        self.models.grid = Grid::of(key);
-        match self.rung {
-            Rung::Global => self.models.global = Homography::fit(key, &self.models.grid),
-            Rung::Affine => self.models.affine.update(pool, key, &self.models.grid),
-            Rung::World(_) => self.models.worlds = self.worlds(key),
-            Rung::Hold | Rung::Linear | Rung::Quadratic => {}
+    /// Takes in what `key` shows of the predictions of `older`, which its motion points back to.
+    fn weigh(
+        &mut self,
+        pool: &ThreadPool,
+        key: &KeyFrame,
+        models: &Models,
+        older: Option<&KeyFrame>,
+        before: Option<&KeyFrame>,
+    ) {
+        let older = older.filter(|older| !older.displacement.data().is_empty());
+        let quadratic = older.zip(before).and_then(|(older, before)| Quadratic::new(older, before));
+        let predictions = older.and_then(|older| {
+            let after = (key.content_time - older.content_time).as_secs_f64();
+            let phase = (after / older.motion_span()?.as_secs_f64()) as f32;
+            Some(Predictions { key: older, models: &self.models, older: quadratic.as_ref(), phase })
+        });
+        let world = models.worlds[0].as_ref();
+        let is_still = |x: u32, y: u32| {
+            let own = world.and_then(|world| world.own_motion_of(key, &models.grid, x, y));
+            own.is_some_and(|own| own.iter().all(|px| px.abs() < STILL_PX))
+        };
+        self.evidence.update(pool, key, &models.grid, predictions.as_ref(), is_still);
+    }
+
+    /// Works out what the rungs need of `key`.
+    fn prepare(&mut self, pool: &ThreadPool, key: &KeyFrame) -> Models {
+        // Their buffers go round: those of the key before last are taken over.
+        let mut models = std::mem::take(&mut self.spare);
+        models.grid = Grid::of(key);
+        let uses = |rung| match self.choice {
+            Choice::Always(always) => always == rung,
+            Choice::World => false,
+            Choice::Evidence => true,
+        };
+        if uses(Rung::Global) {
+            models.global = Homography::fit(key, &models.grid);
         }
+        if uses(Rung::Affine) {
+            models.affine.update(pool, key, &models.grid);
+        }
+        if !matches!(self.choice, Choice::Always(_)) {
+            models.worlds = self.worlds(key);
+        }
+        models
     }
 
     /// The camera's ways on from `key`, where depth, cameras and times tell them.
@@ -163,7 +240,9 @@ impl Ladder {
         self.velocity.resize(width, height);
         self.acceleration.resize(width, height);
         let px_per_span = self.px_per_span(key);
-        let (models, rung, held) = (&self.models, self.rung, &*key);
+        let (models, evidence, held) = (&self.models, &self.evidence, &*key);
+        let has_depth = !key.depth.data().is_empty();
+        let (choice, order) = (self.choice, self.evidence.order());
         for_each_row_of_two(
             pool,
             &mut self.velocity,
@@ -172,6 +251,14 @@ impl Ladder {
             |y, velocities, accelerations| {
                 let cells = (0..).zip(velocities.iter_mut().zip(accelerations));
                 for (x, (velocity, acceleration)) in cells {
+                    let rung = match choice {
+                        Choice::Always(rung) => rung,
+                        Choice::World => Rung::World(order),
+                        Choice::Evidence => {
+                            let depth = if has_depth { held.depth.at(x, y) } else { 0 };
+                            evidence.rung_at(x, y, depth)
+                        }
+                    };
                     let curve = models
                         .curve(rung, held, quadratic.as_ref(), x, y)
                         .unwrap_or_else(|| Curve::straight(held.displacement.at(x, y)));

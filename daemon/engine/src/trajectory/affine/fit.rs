@@ -73,6 +73,9 @@ impl AffineField {
     #[must_use]
     #[inline(always)]
     pub fn curve(&self, key: &KeyFrame, grid: &Grid, x: u32, y: u32) -> Option<Curve> {
+        if self.lattice.data().is_empty() {
+            return None;
+        }
         let d = key.displacement.at(x, y);
         let depth = if key.depth.data().is_empty() { 0 } else { key.depth.at(x, y) };
         let (mut weights, mut sum) = (0.0, [[0.0; 2]; 2]);

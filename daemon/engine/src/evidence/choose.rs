@@ -1,0 +1,175 @@
+//! (4) of [`super`], and the choice.
+
+use rayon::ThreadPool;
+
+use super::{PerRung, RUNGS, Sample, index_of};
+use crate::bands::for_each_row;
+use crate::plane::Plane;
+use crate::trajectory::camera_path::CameraOrder;
+use crate::trajectory::rung::Rung;
+use crate::trajectory::surface::is_same_surface;
+
+/// Samples around one that are judged with it, per side: 5x5.
+const REACH: u32 = 2;
+/// How much worse than the best the image's rung may be on a surface of a single sample; of several,
+/// this over their number.
+const DOUBT: f32 = 0.1;
+/// A cheaper rung may be worse than the best by this: the error of a tenth of a pixel,
+const TOLERANCE: f32 = 0.002_5;
+/// and this part of the best's own.
+const TOLERANCE_SHARE: f32 = 0.05;
+/// How many tolerances the rung in use may be worse than the best; and by what part of one a cheaper
+/// rung may be, so as to take its place.
+const HYSTERESIS: f32 = 3.0;
+
+/// Gives every sample its rung, and returns that of the image as a whole, which was `image`.
+pub(super) fn choose(
+    pool: &ThreadPool,
+    order: CameraOrder,
+    image: Rung,
+    samples: &mut Plane<Sample>,
+) -> Rung {
+    let (mut sum, mut count) = (PerRung::default(), 0.0);
+    for sample in samples.data().iter().filter(|sample| sample.keys > 0) {
+        for (sum, mean) in sum.iter_mut().zip(sample.mean) {
+            *sum += mean;
+        }
+        count += 1.0;
+    }
+    if count == 0.0 {
+        samples.data_mut().iter_mut().for_each(|sample| sample.rung = image);
+        return image;
+    }
+    let mean = sum.map(|sum| sum / count);
+    let tolerated = |rung| Preferred { rung, slack: None };
+    let image = cheapest(&mean, order, &[tolerated(image)]);
+    let known = samples.clone();
+    for_each_row(pool, samples, |row, samples| {
+        for (column, sample) in (0..).zip(samples) {
+            let whole = |count: f32| Preferred { rung: image, slack: Some(DOUBT / count) };
+            sample.rung = match score(&known, column, row) {
+                Some((score, count)) if sample.keys > 1 => {
+                    cheapest(&score, order, &[tolerated(sample.rung), whole(count)])
+                }
+                Some((score, count)) => cheapest(&score, order, &[whole(count)]),
+                None => image,
+            };
+        }
+    });
+    image
+}
+
+/// (4) at one sample, and of how many; None where nothing is known of the surface.
+fn score(samples: &Plane<Sample>, column: u32, row: u32) -> Option<(PerRung, f32)> {
+    let depth = samples.at(column, row).depth;
+    let (mut sum, mut count) = (PerRung::default(), 0.0);
+    let last = [samples.width() - 1, samples.height() - 1];
+    for row in row.saturating_sub(REACH)..=(row + REACH).min(last[1]) {
+        let columns = column.saturating_sub(REACH)..=(column + REACH).min(last[0]);
+        for column in columns {
+            let sample = samples.at(column, row);
+            if sample.keys > 0 && is_same_surface(sample.depth, depth) {
+                for (sum, mean) in sum.iter_mut().zip(sample.mean) {
+                    *sum += mean;
+                }
+                count += 1.0;
+            }
+        }
+    }
+    (count > 0.0).then(|| (sum.map(|sum| sum / count), count))
+}
+
+/// A rung that is taken before others although they are better.
+struct Preferred {
+    rung: Rung,
+    /// By how much they may be; None for [`HYSTERESIS`] tolerances.
+    slack: Option<f32>,
+}
+
+/// The first of `preferred` that is good enough, unless a cheaper one is as good as the best; else the
+/// cheapest rung within the tolerance of the best.
+fn cheapest(score: &PerRung, order: CameraOrder, preferred: &[Preferred]) -> Rung {
+    let is_open = |rung: Rung| !matches!(rung, Rung::World(other) if other != order);
+    let open = || RUNGS.into_iter().zip(score).filter(|(rung, _)| is_open(*rung));
+    let best = open().map(|(_, score)| *score).fold(f32::INFINITY, f32::min);
+    let tolerance = TOLERANCE + TOLERANCE_SHARE * best;
+    let cheapest_within = |slack: f32| {
+        let found = open().find(|(_, score)| **score <= best + slack);
+        found.map_or(Rung::Linear, |(rung, _)| rung)
+    };
+    let as_good = cheapest_within(tolerance / HYSTERESIS);
+    for Preferred { rung, slack } in preferred {
+        let rung = if matches!(rung, Rung::World(_)) { Rung::World(order) } else { *rung };
+        let slack = slack.unwrap_or(0.0).max(HYSTERESIS * tolerance);
+        let index = index_of(rung);
+        if score[index] <= best + slack && index <= index_of(as_good) {
+            return rung;
+        }
+    }
+    cheapest_within(tolerance)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ORDER: CameraOrder = CameraOrder::Damped;
+
+    /// The score with these numbers for hold, global, linear, affine, quadratic and the worlds.
+    fn score(of: [f32; 6]) -> PerRung {
+        [of[0], of[1], of[2], of[3], of[4], of[5], of[5], of[5]]
+    }
+
+    fn in_use(score: &PerRung, rung: Rung) -> Rung {
+        cheapest(score, ORDER, &[Preferred { rung, slack: None }])
+    }
+
+    #[test]
+    fn the_cheapest_rung_within_the_tolerance_is_taken() {
+        let clear = score([0.5, 0.5, 0.3, 0.1, 0.3, 0.2]);
+        assert_eq!(in_use(&clear, Rung::Hold), Rung::Affine);
+        let level = score([0.5, 0.5, 0.101, 0.1, 0.3, 0.1]);
+        assert_eq!(in_use(&level, Rung::Hold), Rung::Linear);
+    }
+
+    #[test]
+    fn the_rung_in_use_stays_until_it_is_clearly_worse_or_a_cheaper_one_as_good() {
+        let slightly = score([0.5, 0.5, 0.115, 0.1, 0.3, 0.3]);
+        assert_eq!(in_use(&slightly, Rung::Linear), Rung::Linear);
+        assert_eq!(in_use(&slightly, Rung::Affine), Rung::Affine);
+        let needless = score([0.5, 0.5, 0.1, 0.1, 0.3, 0.3]);
+        assert_eq!(in_use(&needless, Rung::Affine), Rung::Linear);
+        let clearly = score([0.5, 0.5, 0.1, 0.2, 0.3, 0.3]);
+        assert_eq!(in_use(&clearly, Rung::Affine), Rung::Linear);
+    }
+
+    #[test]
+    fn of_the_camera_orders_only_the_chosen_one_is_open() {
+        let mut world = score([0.5; 6]);
+        world[index_of(Rung::World(CameraOrder::Accelerated))] = 0.0;
+        assert_eq!(in_use(&world, Rung::Hold), Rung::Hold);
+        world[index_of(Rung::World(ORDER))] = 0.1;
+        assert_eq!(in_use(&world, Rung::Hold), Rung::World(ORDER));
+        let before = Rung::World(CameraOrder::Constant);
+        assert_eq!(in_use(&world, before), Rung::World(ORDER), "the order goes along");
+    }
+
+    #[test]
+    fn a_lone_sample_is_judged_as_the_image_is_and_a_surface_for_itself() {
+        let (turns, flies) =
+            (score([0.9, 0.9, 0.6, 0.0, 0.6, 0.6]), score([0.9, 0.9, 0.0, 0.6, 0.6, 0.6]));
+        let samples = |is_turning: fn(u32, u32) -> bool| {
+            crate::testing::plane(20, 20, |x, y| {
+                let mean = if is_turning(x, y) { turns } else { flies };
+                Sample { depth: 1 << 20, mean, keys: 2, ..Sample::default() }
+            })
+        };
+        let pool = crate::testing::pool(2);
+        let mut lone = samples(|x, y| (x, y) == (10, 10));
+        assert_eq!(choose(&pool, ORDER, Rung::Hold, &mut lone), Rung::Linear);
+        assert_eq!(lone.at(10, 10).rung, Rung::Linear);
+        let mut patch = samples(|x, y| x < 8 && y < 8);
+        choose(&pool, ORDER, Rung::Hold, &mut patch);
+        assert_eq!((patch.at(3, 3).rung, patch.at(15, 15).rung), (Rung::Affine, Rung::Linear));
+    }
+}

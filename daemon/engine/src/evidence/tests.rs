@@ -1,0 +1,155 @@
+//! What keys show of rungs, through the ladder that asks.
+
+use glam::{DMat4, DVec3};
+
+use super::*;
+use crate::key::{Acceleration, Camera};
+use crate::method::Method;
+use crate::plane::Rect;
+use crate::testing::{plane, pool};
+use crate::time::{MonoSpan, MonoTime};
+use crate::trajectory::camera_path::between;
+use crate::trajectory::ladder::Ladder;
+
+const SIZE: [u32; 2] = [120, 88];
+const INTERVAL: MonoSpan = MonoSpan::from_ms(25);
+const NEAR: u32 = 2_000_000_000;
+const FAR: u32 = 1_000_000_000;
+
+/// Key number `index` of a scene whose cells came from `was`.
+fn key(
+    index: i64,
+    depth: impl Fn(u32, u32) -> u32,
+    was: impl Fn(u32, u32) -> [f32; 2],
+) -> KeyFrame {
+    let content_time = MonoTime::ZERO + INTERVAL.scale(index, 1);
+    KeyFrame {
+        content_time,
+        motion_from: Some(content_time - INTERVAL),
+        valid: Rect::full(SIZE[0], SIZE[1]),
+        depth: plane(SIZE[0], SIZE[1], depth),
+        displacement: plane(SIZE[0], SIZE[1], |x, y| {
+            let [was_x, was_y] = was(x, y);
+            [x as f32 - was_x, y as f32 - was_y]
+        }),
+        ..KeyFrame::default()
+    }
+}
+
+/// The ladder of `method` after these keys, and the last of them.
+fn climbed(method: Method, keys: impl Iterator<Item = KeyFrame>) -> (Ladder, KeyFrame) {
+    let mut ladder = Ladder::new(method, None).unwrap();
+    let mut taken: Vec<KeyFrame> = Vec::new();
+    for mut key in keys {
+        let [older, before] = [1, 2].map(|back| taken.len().checked_sub(back).map(|i| &taken[i]));
+        let older = older.filter(|_| !key.is_cut);
+        ladder.take_key(&pool(2), &mut key, older, before);
+        taken.push(key);
+    }
+    (ladder, taken.pop().unwrap())
+}
+
+/// The rung of the sample that holds a cell.
+fn rung(ladder: &Ladder, x: u32, y: u32) -> Rung {
+    ladder.evidence().samples().at(x / STRIDE, y / STRIDE).rung
+}
+
+fn is_disc(x: u32, y: u32) -> bool {
+    let (dx, dy) = (x as f32 - 60.0, y as f32 - 44.0);
+    dx * dx + dy * dy < 38.0 * 38.0
+}
+
+fn turned(x: u32, y: u32, angle: f32) -> [f32; 2] {
+    let (dx, dy) = (x as f32 - 60.0, y as f32 - 44.0);
+    let (sin, cos) = (libm::sinf(angle), libm::cosf(angle));
+    [60.0 + cos * dx - sin * dy, 44.0 + sin * dx + cos * dy]
+}
+
+#[test]
+fn a_wheel_is_found_to_turn_and_the_wall_behind_it_to_stand() {
+    let keys = (0..4).map(|index| {
+        let was = |x, y| if is_disc(x, y) { turned(x, y, -0.35) } else { [x as f32, y as f32] };
+        key(index, |x, y| if is_disc(x, y) { NEAR } else { FAR }, was)
+    });
+    let (ladder, last) = climbed(Method::Auto, keys);
+    assert_eq!(rung(&ladder, 60, 18), Rung::Affine);
+    assert_eq!(rung(&ladder, 80, 44), Rung::Affine);
+    assert_eq!(rung(&ladder, 4, 4), Rung::Hold);
+    assert_eq!(last.velocity.at(4, 4), Default::default());
+    assert_ne!(last.acceleration.at(60, 18), Acceleration::default());
+}
+
+#[test]
+fn what_falls_is_found_to_accelerate() {
+    // Fallen for 9 keys already: 4.5, 5.5, 6.5, .. pixels per key.
+    let keys = (0..4).map(|index| {
+        let fallen = 9.5 + index as f32;
+        key(index, |_, _| FAR, move |x, y| [x as f32, y as f32 - fallen])
+    });
+    let (ladder, last) = climbed(Method::Auto, keys);
+    assert_eq!(rung(&ladder, 60, 60), Rung::Quadratic);
+    let acceleration = last.acceleration.at(60, 60);
+    assert!((f32::from(acceleration.y) / 32.0 - 1.0).abs() < 0.05, "{acceleration:?}");
+}
+
+#[test]
+fn where_nothing_moves_everything_is_held_and_nothing_accelerates() {
+    let keys = (0..3).map(|index| key(index, |_, _| FAR, |x, y| [x as f32, y as f32]));
+    let (ladder, last) = climbed(Method::Auto, keys);
+    assert!(ladder.evidence().samples().data().iter().all(|sample| sample.rung == Rung::Hold));
+    assert!(last.velocity.data().iter().all(|v| *v == Default::default()));
+    assert!(last.acceleration.data().is_empty());
+}
+
+#[test]
+fn without_a_key_before_that_the_motion_leads_to_nothing_is_known() {
+    let first = || key(0, |_, _| FAR, |x, y| [x as f32 - 3.0, y as f32]);
+    let cut = KeyFrame { is_cut: true, ..key(1, |_, _| FAR, |x, y| [x as f32 - 3.0, y as f32]) };
+    let elsewhere = KeyFrame {
+        motion_from: Some(MonoTime::from_ns(5)),
+        ..key(1, |_, _| FAR, |x, y| [x as f32 - 3.0, y as f32])
+    };
+    for second in [cut, elsewhere] {
+        let (ladder, _) = climbed(Method::Auto, [first(), second].into_iter());
+        let samples = ladder.evidence().samples();
+        assert!(samples.data().iter().all(|sample| sample.keys == 0));
+        assert_eq!(rung(&ladder, 60, 44), Rung::Linear);
+    }
+}
+
+/// A camera that turns by `angle` about y and stands at `x`.
+fn camera(angle: f64, x: f64) -> Camera {
+    let view = DMat4::from_rotation_y(angle) * DMat4::from_translation(DVec3::new(-x, 0.0, 0.0));
+    let mut projection = [0.0; 16];
+    (projection[0], projection[5]) = (1.2, 1.2 * 120.0 / 88.0);
+    (projection[11], projection[14]) = (-1.0, 0.5);
+    Camera { view: view.as_mat4().to_cols_array(), projection }
+}
+
+/// Keys of a still wall 20 units away, seen by a camera whose angle and place are given.
+fn seen(at: impl Fn(i64) -> Camera) -> impl Iterator<Item = KeyFrame> {
+    (0..7).map(move |index| {
+        let (now, then) = (at(index), at(index - 1));
+        let back = between(&now, &then, Rect::full(SIZE[0], SIZE[1])).unwrap();
+        let depth = u32::MAX / 40;
+        KeyFrame {
+            camera: Some(now),
+            motion_from_camera: Some(then),
+            inverse_distance_per_depth_key: Some(2.0 / u32::MAX as f32),
+            ..key(index, |_, _| depth, |x, y| back.place([x as f32, y as f32], 1.0 / 20.0))
+        }
+    })
+}
+
+#[test]
+fn the_order_of_the_camera_is_the_one_that_would_have_met_the_keys() {
+    let hurrying = |index: i64| camera(0.0, 0.15 * (index * index) as f64);
+    let (ladder, _) = climbed(Method::World, seen(hurrying));
+    assert_eq!(ladder.evidence().order(), CameraOrder::Accelerated);
+    let steady = |index: i64| camera(0.02 * index as f64, 0.5 * index as f64);
+    let (ladder, _) = climbed(Method::World, seen(steady));
+    assert_eq!(ladder.evidence().order(), CameraOrder::Constant);
+    let jerking = |index: i64| camera(0.0, 0.5 * index as f64 + 0.3 * (index % 2) as f64);
+    let (ladder, _) = climbed(Method::World, seen(jerking));
+    assert_eq!(ladder.evidence().order(), CameraOrder::Constant);
+}
