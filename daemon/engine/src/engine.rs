@@ -209,6 +209,26 @@ impl Engine {
         })
     }
 
+    /// The client has moved the camera on to `view` (world to view, column-major) at
+    /// `content_time`, after its newest key. Of several the newest content time wins. Frames made
+    /// from now on by a method that knows cameras, `world` or `auto`, see what moves with the world
+    /// from there; others take no notice.
+    pub fn late_camera(&mut self, content_time: MonoTime, view: [f32; 16]) {
+        let is_finite = view.iter().all(|element| element.is_finite());
+        if let Some(ladder) = self.ladder.as_mut().filter(|_| is_finite) {
+            ladder.late_camera(content_time, view);
+        }
+    }
+
+    /// Brings the newest key's trajectories up to the late camera.
+    fn catch_up(&mut self) {
+        let Some((ladder, key)) = self.ladder.as_mut().zip(self.newest.as_mut()) else { return };
+        if ladder.catch_up(&self.pool, key, self.previous.as_ref()) {
+            let method = self.config.method.warp();
+            self.backend.take_field(&self.pool, method, key, &self.scratch.map);
+        }
+    }
+
     /// Makes the picture that shows `content_time` into `out`, which takes on the size and format
     /// of the stream. Returns None, with `out` untouched, as long as no key has been taken in.
     pub fn synthesise(
@@ -222,6 +242,7 @@ impl Engine {
 
     fn make(&mut self, content_time: MonoTime, out: &mut ColorPlane) -> Option<FrameReport> {
         let started_at = (self.config.timer)();
+        self.catch_up();
         let key = self.newest.as_ref()?;
         let phase = match key.motion_span() {
             // Back from the newest key.

@@ -35,7 +35,7 @@ pub enum Method {
 
 impl Method {
     /// Every method, in the order in which tables list them.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Hold,
         Self::Blend,
         Self::Voxel,
@@ -85,6 +85,12 @@ impl Method {
     #[must_use]
     pub const fn runs_on_gpus(self) -> bool {
         !matches!(self, Self::Voxel)
+    }
+
+    /// Whether it follows cameras, and so late ones too.
+    #[must_use]
+    pub const fn knows_cameras(self) -> bool {
+        matches!(self, Self::World | Self::Auto)
     }
 
     /// Whether it needs the key after the content time, and so shows everything one interval late.

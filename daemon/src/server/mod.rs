@@ -115,8 +115,8 @@ impl Daemon {
         let allocator =
             Allocator::spawn(pools).context("starting the thread that allocates memory")?;
         let features = match config.sink {
-            SinkSpec::Null => Features::NONE,
-            _ => Features::OUTPUT,
+            SinkSpec::Null => Features::LATE_CAMERA,
+            _ => Features::LATE_CAMERA.with(Features::OUTPUT),
         };
         let terms = Terms {
             features,

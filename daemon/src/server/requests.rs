@@ -54,8 +54,10 @@ impl Server {
             ClientMessage::Submit(submit) => {
                 self.submit(id, submit, now).map_err(|it| it.of_stream(submit.stream))
             }
-            // Not among the features that the welcome offers, and harmless.
-            ClientMessage::LateCamera(camera) => self.stream_of(id, camera.stream).map(|_| ()),
+            ClientMessage::LateCamera(camera) => {
+                self.stream_of(id, camera.stream)?.mailbox.put_late_camera(camera);
+                Ok(())
+            }
             ClientMessage::Subscribe(subscribe) => self.subscribe(id, subscribe),
             ClientMessage::Unsubscribe(unsubscribe) => self.unsubscribe(id, unsubscribe.stream),
             ClientMessage::OutputReleased(released) => self.on_output_released(id, released),

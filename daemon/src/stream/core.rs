@@ -201,6 +201,11 @@ impl StreamCore {
         Ok(report)
     }
 
+    /// The camera is at `view` by `content_time`: see [`Engine::late_camera`].
+    pub fn late_camera(&mut self, content_time: MonoTime, view: [f32; 16]) {
+        self.engine.late_camera(content_time, view);
+    }
+
     /// When to wake for which picture, as seen at `now`.
     #[must_use]
     pub fn plan(&mut self, now: MonoTime) -> Plan {

@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use foreframe_engine::MonoTime;
 use foreframe_protocol::memory::ReadOnlyPool;
 use foreframe_protocol::slots::{SlotTable, SlotUse};
-use foreframe_protocol::{Error, Submit};
+use foreframe_protocol::{Error, LateCamera, Submit};
 
 use super::outlet::Outlet;
 use super::reaper::Reaped;
@@ -67,6 +67,8 @@ struct State {
     slots: SlotTable,
     /// There whenever a slot is submitted.
     waiting: Option<Submission>,
+    /// The pose of the newest content time that was not taken out yet.
+    late_camera: Option<LateCamera>,
     counts: KeyCounts,
     outlets: Outlets,
     is_closed: bool,
@@ -79,6 +81,7 @@ impl Mailbox {
         let state = State {
             slots: SlotTable::new(slots),
             waiting: None,
+            late_camera: None,
             counts: KeyCounts::default(),
             outlets: Arc::default(),
             is_closed: false,
@@ -130,6 +133,22 @@ impl Mailbox {
             }
             None => Taken::Nothing,
         }
+    }
+
+    /// Puts a late camera in; of two the newer content time stays. Nobody is woken: the next picture
+    /// is planned anyway, and looks.
+    pub fn put_late_camera(&self, pose: LateCamera) {
+        let mut state = self.lock();
+        let is_newer =
+            state.late_camera.is_none_or(|held| pose.content_time_ns > held.content_time_ns);
+        if is_newer {
+            state.late_camera = Some(pose);
+        }
+    }
+
+    /// Takes the late camera out.
+    pub fn take_late_camera(&self) -> Option<LateCamera> {
+        self.lock().late_camera.take()
     }
 
     /// The planes of the key frame that was taken out are copied: its slot is the client's again.

@@ -248,6 +248,9 @@ impl StreamThread {
 
     fn make_frame(&mut self, plan: &Plan) {
         self.owes_picture = false;
+        if let Some(pose) = self.parts.mailbox.take_late_camera() {
+            self.core.late_camera(MonoTime::from_ns(pose.content_time_ns), pose.view);
+        }
         let outcome = self.core.make(plan, clock::now);
         self.watch_backend();
         let Some(outcome) = outcome else { return };

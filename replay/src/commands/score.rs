@@ -41,6 +41,10 @@ pub struct Args {
     /// Threads of the engine [default: as many as there are processors]
     #[arg(long, value_name = "N", value_parser = parse_count, allow_negative_numbers = true)]
     pub threads: Option<NonZeroUsize>,
+    /// Tell methods that know cameras the capture's own pose at the time of each frame: what a client
+    /// that sends late cameras gets. Their rows say so.
+    #[arg(long)]
+    pub late_camera: bool,
     /// Chart of speed against accuracy, FILE.svg or FILE.png.
     #[arg(long, value_name = "FILE", value_parser = plot::parse_plot)]
     pub chart: Option<PathBuf>,
@@ -68,6 +72,7 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
             .collect::<anyhow::Result<_>>()?,
         threads: args.threads.unwrap_or_else(all_processors),
         timer: clock::now,
+        late_camera: args.late_camera,
         kept_frames: match args.report {
             Some(_) => {
                 let rows = args.methods.0.len() * args.backends.len();

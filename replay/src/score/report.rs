@@ -64,6 +64,8 @@ pub struct MethodScore {
     pub backend: String,
     /// Whether it was given the key after the frame.
     pub interpolates: bool,
+    /// Whether it was told where the camera is at the time of each frame, after the key.
+    pub late_camera: bool,
     /// Predicted frames.
     pub frames: u64,
     /// See [`super::metrics::psnr_rgb_db`].
@@ -200,7 +202,11 @@ fn push_line(text: &mut String, line: &str) {
 }
 
 fn method_row(score: &MethodScore) -> String {
-    let mark = if score.interpolates { "*" } else { "" };
+    let mark = match (score.interpolates, score.late_camera) {
+        (true, _) => "*",
+        (false, true) => "+",
+        (false, false) => "",
+    };
     let mut row = columns(
         &format!("{}{mark}", score.name),
         &score.frames.to_string(),
@@ -282,6 +288,7 @@ pub(super) mod tests {
             name: "linear",
             backend: "cpu".to_owned(),
             interpolates: false,
+            late_camera: false,
             frames: 36,
             psnr_rgb_db: psnr,
             psnr_y_db: psnr,

@@ -2,10 +2,12 @@
 //!
 //! A method that extrapolates has been given nothing later than the newest key when it makes its
 //! frames. One that interpolates is given the next key first, unless a cut lies before that key:
-//! then it has no more to go by than the others. Work times are the engine's own reports, and
+//! then it has no more to go by than the others. With [`ScoreOptions::late_camera`], and not without,
+//! methods that know cameras are told the pose at the time of each frame. Work times are the engine's own reports, and
 //! while an engine works nothing else runs here; comparing is done afterwards, in parallel.
 
 use std::num::NonZeroUsize;
+use std::ops::Range;
 use std::sync::Arc;
 
 use anyhow::{Context as _, ensure};
@@ -37,6 +39,8 @@ pub struct ScoreOptions {
     pub timer: fn() -> MonoTime,
     /// How many frames to keep for a flip viewer, spread over the recording.
     pub kept_frames: usize,
+    /// Tells methods that know cameras where the recording's is at the time of each frame.
+    pub late_camera: bool,
 }
 
 /// Scores one recording. `on_key` is called after each key.
@@ -73,8 +77,9 @@ pub fn score_recording(
         let predicted = plan.predicted(index);
         let times: Vec<_> =
             predicted.clone().map(|frame| recording.heads()[frame].content_time).collect();
+        let poses = late_poses(recording, predicted.clone(), options.late_camera)?;
         for run in &mut runs {
-            run.make(&key, next.as_ref(), &times)
+            run.make(&key, next.as_ref(), &times, &poses)
                 .with_context(|| format!("key frame {}", plan.keys[index].frame))?;
         }
         let truths: Vec<_> = predicted
@@ -119,6 +124,23 @@ pub fn score_recording(
             .collect(),
         flips,
     })
+}
+
+/// World to view at each of `frames` where it is to be told and the recording has it.
+fn late_poses(
+    recording: &mut dyn Recording,
+    frames: Range<usize>,
+    is_told: bool,
+) -> anyhow::Result<Vec<Option<[f32; 16]>>> {
+    let mut pose = |frame| -> anyhow::Result<_> {
+        if !is_told {
+            return Ok(None);
+        }
+        let read = recording.read(frame, Wanted::Color);
+        let read = read.with_context(|| format!("the camera of frame {frame}"))?;
+        Ok(read.camera.map(|camera| camera.view))
+    };
+    frames.map(&mut pose).collect()
 }
 
 fn count_motion(plan: &Plan) -> MotionCounts {
@@ -187,13 +209,18 @@ impl MethodRun {
         key: &Frame,
         next: Option<&Frame>,
         times: &[MonoTime],
+        poses: &[Option<[f32; 16]>],
     ) -> anyhow::Result<()> {
         self.push(key)?;
         if let Some(next) = next.filter(|next| self.method.interpolates() && !next.is_cut) {
             self.push(next)?;
         }
         self.outputs.resize_with(times.len(), || ColorPlane::Rgba8(Plane::default()));
-        for (time, output) in times.iter().zip(&mut self.outputs) {
+        for ((time, pose), output) in times.iter().zip(poses).zip(&mut self.outputs) {
+            if let Some(view) = pose.filter(|_| self.method.knows_cameras()) {
+                self.engine.late_camera(*time, view);
+                self.tally.add_late_camera();
+            }
             let report = self.engine.synthesise(*time, output).context("the engine has no key")?;
             self.tally.add_frame_work(report.work);
         }

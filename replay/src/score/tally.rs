@@ -81,6 +81,7 @@ impl FrameScore {
 #[derive(Debug)]
 pub struct MethodTally {
     method: Method,
+    had_late_camera: bool,
     psnr_rgb_db: Mean,
     psnr_y_db: Mean,
     /// By place after the key, from 0.
@@ -100,6 +101,7 @@ impl MethodTally {
     pub fn new(method: Method, ratio: usize) -> Self {
         Self {
             method,
+            had_late_camera: false,
             psnr_rgb_db: Mean::default(),
             psnr_y_db: Mean::default(),
             psnr_y_by_phase_db: vec![Mean::default(); ratio - 1],
@@ -116,6 +118,11 @@ impl MethodTally {
     /// Taking in a key cost so much.
     pub fn add_key_work(&mut self, work: MonoSpan) {
         self.key_ms.add(work.as_ms_f64());
+    }
+
+    /// The method was told where the camera is at the time of a frame.
+    pub fn add_late_camera(&mut self) {
+        self.had_late_camera = true;
     }
 
     /// Making a frame cost so much.
@@ -161,6 +168,7 @@ impl MethodTally {
             name: self.method.name(),
             backend,
             interpolates: self.method.interpolates(),
+            late_camera: self.had_late_camera,
             frames: self.psnr_y_db.count,
             psnr_rgb_db: self.psnr_rgb_db.value(),
             psnr_y_db: self.psnr_y_db.value(),

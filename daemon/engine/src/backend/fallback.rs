@@ -76,6 +76,23 @@ impl Backend {
         self.cpu.take_key(pool, method, key);
     }
 
+    /// Takes the field of the key that was taken last again: its trajectories have changed.
+    pub(crate) fn take_field(
+        &mut self,
+        pool: &ThreadPool,
+        method: Method,
+        key: &KeyFrame,
+        map: &FieldMap,
+    ) {
+        if let Some(gpu) = &mut self.gpu {
+            match gpu.take_field(key, map) {
+                Ok(()) => return,
+                Err(error) => self.fall(&error),
+            }
+        }
+        self.cpu.take_key(pool, method, key);
+    }
+
     /// Makes a picture after the key that was taken last into `out`, which has the size and format
     /// of the keys.
     pub(crate) fn make(&mut self, pool: &ThreadPool, frame: &FrameInput<'_>, out: &mut ColorPlane) {

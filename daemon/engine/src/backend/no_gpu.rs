@@ -72,6 +72,10 @@ impl GpuBackend {
         match self.0 {}
     }
 
+    pub(crate) fn take_field(&mut self, _: &KeyFrame, _: &FieldMap) -> Result<(), GpuError> {
+        match self.0 {}
+    }
+
     pub(crate) fn make(&mut self, _: &FrameInput<'_>, _: &mut ColorPlane) -> Result<(), GpuError> {
         match self.0 {}
     }

@@ -18,6 +18,12 @@ const DOUBT: f32 = 0.1;
 const TOLERANCE: f32 = 0.002_5;
 /// and this part of the best's own.
 const TOLERANCE_SHARE: f32 = 0.05;
+/// A rung below [`Rung::Linear`] ignores what the newest key says of motion. Where something begins
+/// to move it has failed no more than the others; so it is taken only where it has not failed (an
+/// error of a fifth of a pixel),
+const GOOD: f32 = 0.01;
+/// or where the motion field has failed by so much more.
+const CLEARLY: f32 = 0.05;
 /// How many tolerances the rung in use may be worse than the best; and by what part of one a cheaper
 /// rung may be, so as to take its place.
 const HYSTERESIS: f32 = 3.0;
@@ -89,7 +95,14 @@ struct Preferred {
 /// The first of `preferred` that is good enough, unless a cheaper one is as good as the best; else the
 /// cheapest rung within the tolerance of the best.
 fn cheapest(score: &PerRung, order: CameraOrder, preferred: &[Preferred]) -> Rung {
-    let is_open = |rung: Rung| !matches!(rung, Rung::World(other) if other != order);
+    let linear = index_of(Rung::Linear);
+    let is_open = |rung: Rung| match (rung, index_of(rung)) {
+        (Rung::World(other), _) => other == order,
+        (_, index) if index < linear => {
+            score[index] <= GOOD || score[index] + CLEARLY < score[linear]
+        }
+        _ => true,
+    };
     let open = || RUNGS.into_iter().zip(score).filter(|(rung, _)| is_open(*rung));
     let best = open().map(|(_, score)| *score).fold(f32::INFINITY, f32::min);
     let tolerance = TOLERANCE + TOLERANCE_SHARE * best;
@@ -102,7 +115,7 @@ fn cheapest(score: &PerRung, order: CameraOrder, preferred: &[Preferred]) -> Run
         let rung = if matches!(rung, Rung::World(_)) { Rung::World(order) } else { *rung };
         let slack = slack.unwrap_or(0.0).max(HYSTERESIS * tolerance);
         let index = index_of(rung);
-        if score[index] <= best + slack && index <= index_of(as_good) {
+        if is_open(rung) && score[index] <= best + slack && index <= index_of(as_good) {
             return rung;
         }
     }
@@ -144,10 +157,18 @@ mod tests {
     }
 
     #[test]
+    fn where_all_have_failed_alike_the_motion_field_is_believed() {
+        let begins_to_move = score([0.3; 6]);
+        assert_eq!(in_use(&begins_to_move, Rung::Hold), Rung::Linear);
+        let field_is_wrong = score([0.3, 0.3, 0.5, 0.5, 0.5, 0.5]);
+        assert_eq!(in_use(&field_is_wrong, Rung::Linear), Rung::Hold);
+    }
+
+    #[test]
     fn of_the_camera_orders_only_the_chosen_one_is_open() {
         let mut world = score([0.5; 6]);
         world[index_of(Rung::World(CameraOrder::Accelerated))] = 0.0;
-        assert_eq!(in_use(&world, Rung::Hold), Rung::Hold);
+        assert_eq!(in_use(&world, Rung::Hold), Rung::Linear);
         world[index_of(Rung::World(ORDER))] = 0.1;
         assert_eq!(in_use(&world, Rung::Hold), Rung::World(ORDER));
         let before = Rung::World(CameraOrder::Constant);

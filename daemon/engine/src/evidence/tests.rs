@@ -153,3 +153,46 @@ fn the_order_of_the_camera_is_the_one_that_would_have_met_the_keys() {
     let (ladder, _) = climbed(Method::World, seen(jerking));
     assert_eq!(ladder.evidence().order(), CameraOrder::Constant);
 }
+
+#[test]
+fn a_late_camera_leads_what_moves_with_the_world_and_the_newest_pose_wins() {
+    let steady = |index: i64| camera(0.0, 0.5 * index as f64);
+    for method in [Method::World, Method::Auto] {
+        let (mut ladder, mut key) = climbed(method, seen(steady));
+        let predicted = key.velocity.at(60, 44);
+        let at = |ms| MonoTime::ZERO + INTERVAL.scale(6, 1) + MonoSpan::from_ms(ms);
+        ladder.late_camera(at(10), camera(0.05, 3.3).view);
+        assert!(ladder.catch_up(&pool(1), &mut key, None), "{method}");
+        let told = key.velocity.at(60, 44);
+        assert_ne!(told, predicted, "{method}");
+        assert!(!ladder.catch_up(&pool(1), &mut key, None), "nothing is new");
+        for older in [at(10), at(5), at(-30)] {
+            ladder.late_camera(older, camera(-0.2, 9.0).view);
+            assert!(!ladder.catch_up(&pool(1), &mut key, None), "an older pose is no news");
+        }
+        ladder.late_camera(at(15), camera(-0.05, 3.6).view);
+        assert!(ladder.catch_up(&pool(1), &mut key, None));
+        assert_ne!(key.velocity.at(60, 44), told);
+    }
+}
+
+#[test]
+fn a_late_pose_is_where_the_picture_goes() {
+    let steady = |index: i64| camera(0.0, 0.5 * index as f64);
+    let (mut ladder, mut key) = climbed(Method::Auto, seen(steady));
+    let late = camera(0.04, 3.9);
+    ladder.late_camera(MonoTime::ZERO + INTERVAL.scale(7, 1), late.view);
+    assert!(ladder.catch_up(&pool(1), &mut key, None));
+    let there = between(&steady(6), &late, Rect::full(SIZE[0], SIZE[1])).unwrap();
+    for (x, y) in [(60, 44), (20, 70), (100, 12)] {
+        let expected = there.place([x as f32, y as f32], 1.0 / 20.0);
+        let (v, a) = (key.velocity.at(x, y), key.acceleration.at(x, y));
+        let found = [
+            x as f32 + f32::from(v.x) / 32.0 + f32::from(a.x) / 64.0,
+            y as f32 + f32::from(v.y) / 32.0 + f32::from(a.y) / 64.0,
+        ];
+        for (found, expected) in found.into_iter().zip(expected) {
+            assert!((found - expected).abs() < 0.1, "expected {expected}, found {found}");
+        }
+    }
+}

@@ -21,14 +21,10 @@ use super::rung::Rung;
 use super::world::World;
 use crate::bands::for_each_row_of_two;
 use crate::evidence::{Evidence, Predictions};
-use crate::key::{Acceleration, KeyFrame, Velocity};
+use crate::key::{Acceleration, Camera, KeyFrame, Velocity};
 use crate::method::Method;
 use crate::plane::Plane;
 use crate::time::MonoTime;
-
-/// Own motion, pixels per span and axis, up to which a surface moves with the world: more than the
-/// motion and depth of real engines are off.
-const STILL_PX: f32 = 0.25;
 
 /// What the rungs need of one key beside its planes.
 #[derive(Clone, Debug, Default)]
@@ -38,6 +34,8 @@ pub struct Models {
     affine: AffineField,
     /// By [`CameraOrder`].
     worlds: [Option<World>; CameraOrder::ALL.len()],
+    /// With the camera on its way to a late pose, which takes the place of every order.
+    late: Option<World>,
 }
 
 impl Models {
@@ -51,6 +49,12 @@ impl Models {
     #[must_use]
     pub fn world(&self, order: CameraOrder) -> Option<&World> {
         self.worlds[order as usize].as_ref()
+    }
+
+    /// Whether a late pose says where the surface of a cell goes on to: it moves with the world.
+    #[inline(always)]
+    fn is_led_by_late_camera(&self, key: &KeyFrame, x: u32, y: u32) -> bool {
+        self.late.as_ref().is_some_and(|late| late.is_still(key, &self.grid, x, y))
     }
 
     /// Where `rung` takes the surface of a cell; None where it cannot tell. `older` reads the key
@@ -73,7 +77,8 @@ impl Models {
             Rung::Affine => self.affine.curve(key, grid, x, y),
             Rung::Quadratic => older.and_then(|older| older.curve(key, grid, x, y)),
             Rung::World(order) => {
-                self.worlds[order as usize].as_ref().map(|world| world.curve(key, grid, x, y))
+                let world = self.late.as_ref().or(self.worlds[order as usize].as_ref());
+                world.map(|world| world.curve(key, grid, x, y))
             }
         };
         curve.filter(Curve::is_known)
@@ -101,6 +106,10 @@ pub struct Ladder {
     models: Models,
     spare: Models,
     evidence: Evidence,
+    /// The newest pose that the client has sent ahead of its key.
+    late: Option<Pose>,
+    /// Whether the trajectories of the newest key do not know it yet.
+    is_late_new: bool,
     velocity: Plane<Velocity>,
     acceleration: Plane<Acceleration>,
 }
@@ -131,6 +140,8 @@ impl Ladder {
             models: Models::default(),
             spare: Models::default(),
             evidence: Evidence::default(),
+            late: None,
+            is_late_new: false,
             velocity: Plane::default(),
             acceleration: Plane::default(),
         })
@@ -155,6 +166,10 @@ impl Ladder {
             self.path.cut();
             self.evidence.cut();
         }
+        // The evidence is of what was predicted, not of what was told.
+        self.models.late = None;
+        self.late = self.late.filter(|late| late.time > key.content_time && !key.is_cut);
+        self.is_late_new = false;
         if let Some(camera) = key.camera {
             self.path.push(Pose { time: key.content_time, camera });
         }
@@ -168,7 +183,46 @@ impl Ladder {
             self.weigh(pool, key, &models, followed, before);
         }
         self.spare = std::mem::replace(&mut self.models, models);
+        self.models.late = self.late_world(key);
         self.fill(pool, key, older);
+    }
+
+    /// The client has moved the camera on to `view` at `time`, after its newest key. The newest pose
+    /// wins. Takes effect with [`Ladder::catch_up`].
+    pub fn late_camera(&mut self, time: MonoTime, view: [f32; 16]) {
+        let Some(newest) = self.path.newest() else { return };
+        let is_newer = self.late.is_none_or(|late| time > late.time) && time > newest.time;
+        if is_newer && !matches!(self.choice, Choice::Always(_)) {
+            self.late = Some(Pose { time, camera: Camera { view, ..newest.camera } });
+            self.is_late_new = true;
+        }
+    }
+
+    /// Brings the trajectories of `key`, the one that was taken last, up to the newest late pose.
+    /// Returns whether they changed.
+    pub fn catch_up(
+        &mut self,
+        pool: &ThreadPool,
+        key: &mut KeyFrame,
+        older: Option<&KeyFrame>,
+    ) -> bool {
+        let is_new = std::mem::take(&mut self.is_late_new) && !key.displacement.data().is_empty();
+        let late = if is_new { self.late_world(key) } else { None };
+        if late.is_none() {
+            return false;
+        }
+        self.models.late = late;
+        self.fill(pool, key, older);
+        true
+    }
+
+    /// The camera's way from `key` to the late pose.
+    fn late_world(&self, key: &KeyFrame) -> Option<World> {
+        let is_newest = |pose: &&Pose| pose.time == key.content_time;
+        self.path.newest().filter(is_newest)?;
+        let span = key.motion_span().filter(|_| !key.depth.data().is_empty())?;
+        let older = self.camera_at(key, key.motion_from?)?;
+        World::new(key, &older, &self.path.towards(&self.late?)?, span)
     }
 
     /// Takes in what `key` shows of the predictions of `older`, which its motion points back to.
@@ -188,10 +242,8 @@ impl Ladder {
             Some(Predictions { key: older, models: &self.models, older: quadratic.as_ref(), phase })
         });
         let world = models.worlds[0].as_ref();
-        let is_still = |x: u32, y: u32| {
-            let own = world.and_then(|world| world.own_motion_of(key, &models.grid, x, y));
-            own.is_some_and(|own| own.iter().all(|px| px.abs() < STILL_PX))
-        };
+        let is_still =
+            |x: u32, y: u32| world.is_some_and(|world| world.is_still(key, &models.grid, x, y));
         self.evidence.update(pool, key, &models.grid, predictions.as_ref(), is_still);
     }
 
@@ -229,7 +281,7 @@ impl Ladder {
     }
 
     /// The camera at the time that the motion of `key` points back to.
-    fn camera_at(&self, key: &KeyFrame, time: MonoTime) -> Option<crate::key::Camera> {
+    fn camera_at(&self, key: &KeyFrame, time: MonoTime) -> Option<Camera> {
         self.path.at(time).map(|pose| pose.camera).or(key.motion_from_camera)
     }
 
@@ -254,6 +306,9 @@ impl Ladder {
                     let rung = match choice {
                         Choice::Always(rung) => rung,
                         Choice::World => Rung::World(order),
+                        Choice::Evidence if models.is_led_by_late_camera(held, x, y) => {
+                            Rung::World(order)
+                        }
                         Choice::Evidence => {
                             let depth = if has_depth { held.depth.at(x, y) } else { 0 };
                             evidence.rung_at(x, y, depth)

@@ -18,6 +18,10 @@ use super::grid::Grid;
 use crate::key::{Camera, KeyFrame};
 use crate::time::MonoSpan;
 
+/// Own motion, pixels per span and axis, up to which a surface moves with the world: more than the
+/// motion and depth of real engines are off.
+const STILL_PX: f32 = 0.25;
+
 /// The camera's motion around one key.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct World {
@@ -78,12 +82,12 @@ impl World {
         if is_known { own } else { [0.0; 2] }
     }
 
-    /// Own motion of a cell, pixels per span; None where no motion is known.
+    /// Whether a cell moves with the world, as far as is known.
     #[must_use]
-    pub fn own_motion_of(&self, key: &KeyFrame, grid: &Grid, x: u32, y: u32) -> Option<[f32; 2]> {
-        let displacement = key.displacement.at(x, y);
-        let is_known = displacement[0].is_finite() && displacement[1].is_finite();
+    #[inline(always)]
+    pub fn is_still(&self, key: &KeyFrame, grid: &Grid, x: u32, y: u32) -> bool {
         let q = self.inverse_distance(key.depth.at(x, y));
-        is_known.then(|| self.own_motion(grid.centre(x, y), q, displacement))
+        let own = self.own_motion(grid.centre(x, y), q, key.displacement.at(x, y));
+        (own[0].abs() < STILL_PX) & (own[1].abs() < STILL_PX)
     }
 }

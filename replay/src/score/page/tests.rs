@@ -16,6 +16,7 @@ fn report() -> Report {
         threads: NonZeroUsize::MIN,
         timer: || MonoTime::ZERO,
         kept_frames: 3,
+        late_camera: false,
     };
     let score = |name: &str| {
         let mut recording = MemoryRecording::moving_patch(13, [3, 1], &[4]);

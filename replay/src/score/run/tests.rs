@@ -16,6 +16,7 @@ fn options(methods: &[Method]) -> ScoreOptions {
         threads: count(1),
         timer: || MonoTime::ZERO,
         kept_frames: 0,
+        late_camera: false,
     }
 }
 

@@ -144,6 +144,15 @@ impl GpuBackend {
         })
     }
 
+    /// Sends the field of `key`, which has motion, up again. Returns before it is there.
+    ///
+    /// # Errors
+    /// If the device is gone.
+    pub(crate) fn take_field(&mut self, key: &KeyFrame, map: &FieldMap) -> Result<(), GpuError> {
+        let gpu = Arc::clone(&self.gpu);
+        gpu.guard(|| self.send_field(key, map))
+    }
+
     fn send_field(&mut self, key: &KeyFrame, map: &FieldMap) -> Result<(), GpuError> {
         let gpu = Arc::clone(&self.gpu);
         let mut commands = gpu.device.create_command_encoder(&Default::default());

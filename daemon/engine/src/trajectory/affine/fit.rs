@@ -23,19 +23,19 @@ use crate::trajectory::surface::is_same_surface;
 
 /// Cells from one lattice point to the next.
 const STRIDE: u32 = 4;
-/// Reach of a fit in cells, and the step between those that it reads: 9x9 of them.
+/// Reach of a fit in cells, and the step between those that it reads: 5x5 of them.
 const REACH: i32 = 8;
-const STEP: i32 = 2;
+const STEP: i32 = 4;
 /// Cells that a fit reads at most.
 const WINDOW: usize = ((2 * REACH / STEP + 1) * (2 * REACH / STEP + 1)) as usize;
 /// Fewest cells of one surface that a fit takes.
-const MIN_CELLS: usize = 12;
+const MIN_CELLS: usize = 7;
 /// Rounds of reweighting.
 const ROUNDS: usize = 3;
 /// Residual, pixels, at which a cell's weight has halved.
 const HALF_WEIGHT_PX: f32 = 0.5;
-/// Ridge of (4), cells squared: that of one cell at this distance.
-const RIDGE: f32 = 16.0;
+/// Ridge of (4), cells squared: that of one cell two cells away.
+const RIDGE: f32 = 4.0;
 /// A fit predicts the motion of a cell that it is of to this many pixels.
 const AGREES_PX: f32 = 0.5;
 
@@ -184,7 +184,7 @@ fn fit_at(key: &KeyFrame, grid: &Grid, x: u32, y: u32) -> Fit {
 }
 
 /// Mean distance of the window's motion from the middle's, pixels.
-#[expect(clippy::cast_precision_loss, reason = "at most 81 cells")]
+#[expect(clippy::cast_precision_loss, reason = "at most 25 cells")]
 fn spread(window: &[Neighbour], d: [f32; 2]) -> f32 {
     let sum: f32 =
         window.iter().map(|cell| (cell.d[0] - d[0]).abs() + (cell.d[1] - d[1]).abs()).sum();
