@@ -1,4 +1,4 @@
-//! The loop that is timed.
+//! The loops that are timed, in turn: keys with their frames as a stream has them, and plain copies.
 
 use foreframe_engine::{ColorPlane, Engine, EngineConfig, Method, MonoSpan, MonoTime};
 use foreframed::clock;
@@ -7,8 +7,12 @@ use super::copy::PlainCopy;
 use super::keys::{KEY_INTERVAL_S, RenderedKeys};
 use super::{Backend, Settings};
 
-/// Keys that are run before the first that counts: buffers get their sizes, clocks their speed.
-const WARM_UP: usize = 4;
+/// Keys that are run before the first of a round that counts: buffers get their sizes, clocks
+/// their speed, and caches what a stream leaves in them.
+const WARM_UP: usize = 3;
+/// Keys of a round. After each come as many plain copies: in turn, as machines change their speed,
+/// but not in between, as a copy empties the caches that a stream finds full.
+const ROUND: usize = 12;
 
 /// Times of one case, one entry per key or frame.
 #[derive(Clone, PartialEq, Debug, Default)]
@@ -46,32 +50,43 @@ pub(super) fn time_case(
     let mut out = ColorPlane::default();
     let mut times = Times::default();
     let interval = MonoSpan::from_secs_f64(KEY_INTERVAL_S);
-    for index in 0..WARM_UP + settings.keys.get() {
-        let key = &rendered.keys[index % rendered.keys.len()];
+    let frames = settings.frames.get() as i64;
+    let mut index = 0;
+    let mut take_key = || -> anyhow::Result<Vec<MonoTime>> {
         let content_time = MonoTime::from_ns(1_000_000_000) + interval.scale(index as i64, 1);
-        let mut input = key.as_input();
+        let mut input = rendered.keys[index % rendered.keys.len()].as_input();
         input.index = index as u64;
         input.content_time = content_time;
         input.motion_from = Some(content_time - interval);
+        index += 1;
         let mut ends = Vec::with_capacity(settings.frames.get() + 2);
         ends.push(clock::now());
         engine.push_key(&input)?;
         ends.push(clock::now());
-        let frames = settings.frames.get() as i64;
         for frame in 1..=frames {
             engine.synthesise(content_time + interval.scale(frame, frames + 1), &mut out);
             ends.push(clock::now());
         }
-        let copy_starts_at = clock::now();
-        copy.copy(bytes.key() / 2);
-        let key_copied_at = clock::now();
-        copy.copy(bytes.frame() / 2);
-        let frame_copied_at = clock::now();
-        if index >= WARM_UP {
-            times.add_key(&ends);
-            times.key_copy.push(key_copied_at - copy_starts_at);
-            times.frame_copy.push(frame_copied_at - key_copied_at);
+        Ok(ends)
+    };
+    let mut left = settings.keys.get();
+    while left > 0 {
+        for _ in 0..WARM_UP {
+            take_key()?;
         }
+        let round = left.min(ROUND);
+        for _ in 0..round {
+            times.add_key(&take_key()?);
+        }
+        for _ in 0..round {
+            let starts_at = clock::now();
+            copy.copy(bytes.key() / 2);
+            let key_copied_at = clock::now();
+            copy.copy(bytes.frame() / 2);
+            times.key_copy.push(key_copied_at - starts_at);
+            times.frame_copy.push(clock::now() - key_copied_at);
+        }
+        left -= round;
     }
     times.fell_back.clone_from(&engine.backend().fell_back);
     Ok(times)
