@@ -1,13 +1,15 @@
 //! Frames that were handed over and not heard of yet, and what their answers teach.
 //!
-//! Three things: how long answers usually take, so that a display which cannot keep up is noticed
-//! and not flooded; whether the display answers at all; and how many whole refreshes it shows
-//! everything later than its deadline suggests, which some compositors do as a rule.
+//! Four things: how long answers usually take, so that a display which cannot keep up is noticed
+//! and not flooded; whether the display answers at all; how early before a refresh it needs a
+//! frame ([`Deadline`]); and how many whole refreshes it shows everything later than that suggests,
+//! which some compositors do as a rule.
 //!
 //! An answer about a frame says of all older ones that theirs got lost.
 
 use std::collections::VecDeque;
 
+use super::deadline::Deadline;
 use super::recent::Recent;
 use crate::time::{MonoSpan, MonoTime};
 
@@ -35,7 +37,9 @@ const LOSS_MEMORY: u32 = 1_024;
 #[derive(Clone, Copy, Debug)]
 struct Waiting {
     planned: MonoTime,
-    /// Handed over early enough for its refresh.
+    /// From being handed over to the refresh that it was planned for.
+    lead: MonoSpan,
+    /// Handed over early enough, as far as was known.
     was_in_time: bool,
 }
 
@@ -53,17 +57,29 @@ pub(super) struct Flight {
     lateness: VecDeque<i64>,
     /// Refreshes that the display needs from its deadline to showing a frame.
     offset: i64,
+    deadline: Deadline,
 }
 
 impl Flight {
     /// A frame for `planned` was handed over.
-    pub(super) fn hand_over(&mut self, planned: MonoTime, was_in_time: bool) {
-        self.waiting.push_back(Waiting { planned, was_in_time });
+    pub(super) fn hand_over(&mut self, planned: MonoTime, lead: MonoSpan, was_in_time: bool) {
+        self.waiting.push_back(Waiting { planned, lead, was_in_time });
     }
 
     /// The frame for `planned` was shown `refreshes` after it; this was heard at `heard_at`.
-    pub(super) fn on_shown(&mut self, planned: MonoTime, refreshes: i64, heard_at: MonoTime) {
-        let Some(was_in_time) = self.take(planned) else { return };
+    pub(super) fn on_shown(
+        &mut self,
+        planned: MonoTime,
+        refreshes: i64,
+        heard_at: MonoTime,
+        interval: MonoSpan,
+    ) {
+        let Some(Waiting { lead, was_in_time, .. }) = self.take(planned) else { return };
+        // What is not about the next refresh, or was late already, tells nothing of the deadline.
+        let ahead = lead - interval.scale(self.offset, 1);
+        if (0..=1).contains(&refreshes) && ahead > MonoSpan::ZERO {
+            self.deadline.on_frame(ahead, refreshes > 0, interval);
+        }
         self.delays.push(heard_at - planned);
         if self.delays.len() >= ANSWERS_TO_LEARN {
             self.usual_delay = self.delays.percentile(95);
@@ -73,9 +89,13 @@ impl Flight {
         }
     }
 
-    /// The frame for `planned` will never be shown.
-    pub(super) fn on_discarded(&mut self, planned: MonoTime) {
-        self.take(planned);
+    /// The frame for `planned` will never be shown. `is_blamed`: because it came too late.
+    pub(super) fn on_discarded(&mut self, planned: MonoTime, interval: MonoSpan, is_blamed: bool) {
+        let Some(frame) = self.take(planned) else { return };
+        let ahead = frame.lead - interval.scale(self.offset, 1);
+        if is_blamed && ahead > MonoSpan::ZERO {
+            self.deadline.on_frame(ahead, true, interval);
+        }
     }
 
     /// Nothing that was learned from the display holds any more.
@@ -86,6 +106,11 @@ impl Flight {
     /// Refreshes from the display's deadline to the one that shows a frame, beyond the first.
     pub(super) fn offset(&self) -> i64 {
         self.offset
+    }
+
+    /// How long before a refresh the display needs a frame.
+    pub(super) fn deadline(&self) -> MonoSpan {
+        self.deadline.before_refresh()
     }
 
     /// Frames without an answer.
@@ -115,8 +140,8 @@ impl Flight {
         (overdue >= OVERDUE_LIMIT).then(|| due(oldest) + PATIENCE)
     }
 
-    /// Takes out the frame for `planned` and all older ones; whether it was handed over in time.
-    fn take(&mut self, planned: MonoTime) -> Option<bool> {
+    /// Takes out the frame for `planned` and all older ones.
+    fn take(&mut self, planned: MonoTime) -> Option<Waiting> {
         let position = self.waiting.iter().position(|frame| frame.planned == planned)?;
         self.silent_in_a_row = 0;
         self.answers_since_loss = match (position, self.answers_since_loss) {
@@ -124,8 +149,7 @@ impl Flight {
             (_, Some(answers)) if answers < LOSS_MEMORY => Some(answers + 1),
             _ => None,
         };
-        let frame = self.waiting.drain(..=position).next_back()?;
-        Some(frame.was_in_time)
+        self.waiting.drain(..=position).next_back()
     }
 
     fn learn_offset(&mut self, refreshes: i64) {
@@ -143,11 +167,13 @@ impl Flight {
         if offset != self.offset {
             self.offset = offset;
             self.lateness.clear();
+            self.deadline = Deadline::default();
         }
     }
 
     pub(super) fn verify_invariants(&self) {
         assert!((0..=LARGEST_OFFSET).contains(&self.offset), "offset out of bounds: {self:?}");
+        self.deadline.verify_invariants();
         assert!(self.lateness.len() < LATENESS_WINDOW, "lateness was not judged: {self:?}");
         let planned = self.waiting.iter().map(|frame| frame.planned);
         assert!(planned.is_sorted(), "frames out of order: {self:?}");
@@ -159,6 +185,7 @@ mod tests {
     use super::*;
 
     const INTERVAL: MonoSpan = MonoSpan::from_ms(10);
+    const LEAD: MonoSpan = MonoSpan::from_ms(1);
 
     fn at(ms: i64) -> MonoTime {
         MonoTime::ZERO + MonoSpan::from_ms(ms)
@@ -168,8 +195,8 @@ mod tests {
     fn flown(frames: i64, late: i64) -> Flight {
         let mut flight = Flight::default();
         for frame in 1..=frames {
-            flight.hand_over(at(frame * 10), true);
-            flight.on_shown(at(frame * 10), late, at((frame + late) * 10 + 1));
+            flight.hand_over(at(frame * 10), LEAD, true);
+            flight.on_shown(at(frame * 10), late, at((frame + late) * 10 + 1), INTERVAL);
             flight.verify_invariants();
         }
         flight
@@ -178,19 +205,19 @@ mod tests {
     #[test]
     fn a_display_that_stops_to_answer_holds_the_next_frame_and_then_is_called_silent() {
         let mut flight = flown(20, 0);
-        flight.hand_over(at(210), true);
+        flight.hand_over(at(210), LEAD, true);
         assert_eq!(flight.hold_until(at(225), INTERVAL), None, "one answer may be late");
-        flight.hand_over(at(220), true);
+        flight.hand_over(at(220), LEAD, true);
         assert_eq!(flight.hold_until(at(231), INTERVAL), Some(at(321)));
         assert_eq!(flight.hold_until(at(320), INTERVAL), Some(at(321)));
         assert_eq!(flight.hold_until(at(321), INTERVAL), None);
         for frame in 0..i64::from(SILENT_LIMIT) {
-            flight.hand_over(at(330 + frame * 10), true);
+            flight.hand_over(at(330 + frame * 10), LEAD, true);
         }
         assert_eq!(flight.hold_until(at(2_000), INTERVAL), None);
         assert!(flight.is_silent());
-        flight.hand_over(at(2_010), true);
-        flight.on_shown(at(2_010), 0, at(2_011));
+        flight.hand_over(at(2_010), LEAD, true);
+        flight.on_shown(at(2_010), 0, at(2_011), INTERVAL);
         assert!(!flight.is_silent());
     }
 
@@ -198,9 +225,9 @@ mod tests {
     fn answers_that_are_always_late_are_waited_for_and_do_not_hold_anything() {
         let mut flight = Flight::default();
         for frame in 1..100 {
-            flight.hand_over(at(frame * 10), true);
+            flight.hand_over(at(frame * 10), LEAD, true);
             if frame > 8 {
-                flight.on_shown(at((frame - 8) * 10), 0, at(frame * 10));
+                flight.on_shown(at((frame - 8) * 10), 0, at(frame * 10), INTERVAL);
             }
             assert_eq!(flight.hold_until(at(frame * 10), INTERVAL), None, "frame {frame}");
         }
@@ -210,10 +237,10 @@ mod tests {
     #[test]
     fn an_answer_clears_all_older_frames_and_one_that_is_unknown_none() {
         let mut flight = flown(10, 0);
-        (11..15).for_each(|frame| flight.hand_over(at(frame * 10), true));
-        flight.on_discarded(at(777));
+        (11..15).for_each(|frame| flight.hand_over(at(frame * 10), LEAD, true));
+        flight.on_discarded(at(777), INTERVAL, true);
         assert_eq!(flight.unanswered(), 4);
-        flight.on_shown(at(130), 0, at(131));
+        flight.on_shown(at(130), 0, at(131), INTERVAL);
         assert_eq!(flight.unanswered(), 1);
     }
 
@@ -223,13 +250,18 @@ mod tests {
         let mut flight = flown(LATENESS_WINDOW as i64, 1);
         assert_eq!(flight.offset(), 1);
         for frame in 100..200 {
-            flight.hand_over(at(frame * 10), true);
-            flight.on_shown(at(frame * 10), i64::from(frame % 5 == 0), at(frame * 10 + 1));
+            flight.hand_over(at(frame * 10), LEAD, true);
+            flight.on_shown(
+                at(frame * 10),
+                i64::from(frame % 5 == 0),
+                at(frame * 10 + 1),
+                INTERVAL,
+            );
         }
         assert_eq!(flight.offset(), 1, "a miss now and then is none");
         for frame in 200..220 {
-            flight.hand_over(at(frame * 10), true);
-            flight.on_shown(at(frame * 10), -1, at(frame * 10 + 1));
+            flight.hand_over(at(frame * 10), LEAD, true);
+            flight.on_shown(at(frame * 10), -1, at(frame * 10 + 1), INTERVAL);
         }
         assert_eq!(flight.offset(), 0);
     }
@@ -238,8 +270,8 @@ mod tests {
     fn frames_that_we_handed_over_late_say_nothing_about_the_display() {
         let mut flight = Flight::default();
         for frame in 1..100 {
-            flight.hand_over(at(frame * 10), false);
-            flight.on_shown(at(frame * 10), 1, at(frame * 10 + 11));
+            flight.hand_over(at(frame * 10), LEAD, false);
+            flight.on_shown(at(frame * 10), 1, at(frame * 10 + 11), INTERVAL);
         }
         assert_eq!(flight.offset(), 0);
     }

@@ -19,6 +19,8 @@ const SAME_AS_KEY_DIVISOR_VARIABLE: i64 = 8;
 const SLACK_SMOOTHING_DIVISOR: i64 = 8;
 /// Slack that the application should aim at: late enough to be fresh, early enough to be safe.
 const TARGET_SLACK: MonoSpan = MonoSpan::from_us(500);
+/// Deadline and margin together are at most this share of a refresh interval, in percent.
+const EARLIEST_PERCENT: i64 = 85;
 /// So many frames in a row that the display throws away mean that nobody sees them.
 const DISCARDS_TO_HIDE: u32 = 16;
 /// So many of them in a row are no fault of the pacing, and widen no margin.
@@ -127,7 +129,7 @@ impl Pacer {
         let submit_by = (deadline - hand_over).max(now);
         let wake_at = (present_at - self.budget_of(shows)).max(now);
         let submit_from = match (&self.variable, shows) {
-            (None, _) if self.knows_phase() => deadline - interval + hand_over,
+            (None, _) if self.knows_phase() => deadline - interval + hand_over + hand_over,
             (Some(_), Shows::Key) => now,
             (None, _) | (Some(_), Shows::InBetween) => submit_by,
         };
@@ -194,14 +196,16 @@ impl Pacer {
     /// The picture of a started plan was handed to the display at `handed_over_at`, and an answer is
     /// expected. Displays that need no watching, such as timers, are not told of here.
     pub fn on_handed_over(&mut self, plan: &Plan, handed_over_at: MonoTime) {
-        self.flight.hand_over(plan.present_at, handed_over_at <= plan.submit_by);
+        let lead = plan.present_at - handed_over_at;
+        self.flight.hand_over(plan.present_at, lead, handed_over_at <= plan.submit_by);
         self.debug_verify();
     }
 
     /// The frame that was planned for `planned` and handed over will never be shown: a newer one
     /// replaced it, or nobody sees the window.
     pub fn on_discarded(&mut self, planned: MonoTime) {
-        self.flight.on_discarded(planned);
+        let is_blamed = self.variable.is_none() && self.discards_in_a_row < DISCARDS_TO_BLAME;
+        self.flight.on_discarded(planned, self.interval(), is_blamed);
         self.discards_in_a_row = self.discards_in_a_row.saturating_add(1);
         if self.discards_in_a_row > DISCARDS_TO_BLAME {
             self.counts.missed += 1;
@@ -216,7 +220,11 @@ impl Pacer {
         if let Some(variable) = &mut self.variable {
             variable.on_presented(presented_at);
         } else {
+            let was_corrected = self.refresh.is_corrected();
             self.refresh.on_presented(presented_at, self.discards_in_a_row);
+            if self.refresh.is_corrected() != was_corrected {
+                self.flight.on_mode();
+            }
         }
         self.discards_in_a_row = 0;
         let interval = self.interval();
@@ -224,9 +232,9 @@ impl Pacer {
         let late = presented_at - planned;
         if self.variable.is_none() {
             let refreshes = (late + half).as_ns().div_euclid(interval.as_ns().max(1));
-            self.flight.on_shown(planned, refreshes, heard_at);
+            self.flight.on_shown(planned, refreshes, heard_at, interval);
         } else {
-            self.flight.on_shown(planned, 0, heard_at);
+            self.flight.on_shown(planned, 0, heard_at, interval);
         }
         if late > half || late < -half {
             self.on_miss();
@@ -314,7 +322,7 @@ impl Pacer {
         if !self.knows_phase() {
             self.interval().scale(1, 2)
         } else {
-            self.interval().scale(self.flight.offset(), 1)
+            self.interval().scale(self.flight.offset(), 1) + self.flight.deadline()
         }
     }
 
@@ -324,8 +332,11 @@ impl Pacer {
         self.debug_verify();
     }
 
+    /// Leaves a frame that is ready on time no room to be taken for the refresh before.
     fn margin(&self) -> MonoSpan {
-        self.budget.margin(self.interval())
+        let interval = self.interval();
+        let most = interval.scale(EARLIEST_PERCENT, 100) - self.flight.deadline();
+        self.budget.margin(interval).min(most)
     }
 
     /// Time from wake to the refresh of an in-between frame.

@@ -87,7 +87,8 @@ pub struct PacerStatus {
     pub key_work: MonoSpan,
     /// Time from there to the display's deadline.
     pub margin: MonoSpan,
-    /// From that deadline to the refresh: whole refreshes that the display turned out to need.
+    /// From that deadline to the refresh: what the display turned out to need, which may be whole
+    /// refreshes more than a fraction of one.
     pub display_offset: MonoSpan,
     /// Whether the announced refresh rate proved wrong and a measured one is used.
     pub is_rate_corrected: bool,

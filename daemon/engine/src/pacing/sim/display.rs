@@ -5,7 +5,7 @@ use super::rng::SplitMix64;
 use crate::pacing::RefreshKind;
 use crate::time::{MonoSpan, MonoTime};
 
-/// A frame must be handed over this long before the refresh that shows it.
+/// A frame must be handed over this long before the refresh that shows it, as a rule.
 const LATCH: MonoSpan = MonoSpan::from_us(100);
 /// Where the first refresh lies: on no round number, so that nothing starts aligned by luck.
 const FIRST_REFRESH: MonoSpan = MonoSpan::from_ns(3_141_593);
@@ -25,6 +25,8 @@ pub struct DisplayScript {
     pub skipped_per_mille: u32,
     /// Times at which it does so refresh after refresh.
     pub burst: Option<MissBurst>,
+    /// How long before a refresh it takes the frame that it shows then.
+    pub latch: MonoSpan,
     /// Refreshes that it needs from the one that takes a frame to the one that shows it.
     pub depth: u8,
     /// Error of the reported instants, +-.
@@ -59,6 +61,7 @@ impl DisplayScript {
             drift_ppm: 0,
             skipped_per_mille: 0,
             burst: None,
+            latch: LATCH,
             depth: 0,
             timestamp_jitter: MonoSpan::ZERO,
             wrong_per_mille: 0,
@@ -117,7 +120,7 @@ impl SimDisplay {
                 Slot { index, at: self.refresh_at(index) }
             }
             RefreshKind::Variable => {
-                let ready = submitted_at + LATCH;
+                let ready = submitted_at + self.script.latch;
                 let free = |last: Slot| last.at + self.interval();
                 let at = self.last.map_or(ready, |last| ready.max(free(last)));
                 Slot { index: self.last.map_or(0, |last| last.index + 1), at }
@@ -160,7 +163,7 @@ impl SimDisplay {
 
     /// The refresh that takes a frame handed over at `submitted_at`.
     fn taken_at(&self, submitted_at: MonoTime) -> i64 {
-        let ready = submitted_at + LATCH;
+        let ready = submitted_at + self.script.latch;
         let interval = self.script.true_interval.unwrap_or(self.script.refresh_interval);
         let nominal = interval.as_ns().max(1);
         // Drift moves the grid by whole refreshes over a long run: start low, then walk.

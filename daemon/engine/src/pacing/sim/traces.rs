@@ -74,7 +74,7 @@ const fn trace(
 }
 
 /// All of them.
-pub const TRACES: [Trace; 20] = [
+pub const TRACES: [Trace; 21] = [
     trace("even 40 to 120", "nothing goes wrong", (40.0, 120.0), |_| {}),
     trace("even 30 to 48", "a slow display", (30.0, 48.0), |_| {}),
     trace("even 40 to 59.94", "rates that do not divide", (40.0, 59.94), |_| {}),
@@ -121,6 +121,15 @@ pub const TRACES: [Trace; 20] = [
         s.display.true_interval = Some(MonoSpan::from_hz(39.7));
         s.display.depth = 1;
     }),
+    trace(
+        "early deadline",
+        "the display needs frames 4 ms before its refresh",
+        (40.0, 120.0),
+        |s| {
+            s.display.latch = MonoSpan::from_ms(4);
+            s.display.timestamp_jitter = MonoSpan::from_us(500);
+        },
+    ),
     trace("variable refresh", "to 120 Hz, arrivals off by up to 10 %", (40.0, 120.0), |s| {
         s.display.kind = RefreshKind::Variable;
         s.keys.arrival_jitter = s.keys.interval.scale(1, 10);
