@@ -78,7 +78,7 @@ impl Models {
             Rung::Quadratic => older.and_then(|older| older.curve(key, grid, x, y)),
             Rung::World(order) => {
                 let world = self.late.as_ref().or(self.worlds[order as usize].as_ref());
-                world.map(|world| world.curve(key, grid, x, y))
+                world.map(|world| world.curve(key, older, grid, x, y))
             }
         };
         curve.filter(Curve::is_known)

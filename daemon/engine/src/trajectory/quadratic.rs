@@ -41,6 +41,16 @@ impl<'a> Quadratic<'a> {
         })
     }
 
+    /// The depth key of the older field where a point was that is at pixel `at` now, came by `d`, and
+    /// has depth key `depth`: that of the cell of its own surface nearest to there.
+    #[must_use]
+    #[inline(always)]
+    pub fn depth_before(&self, at: [f32; 2], d: [f32; 2], depth: u32) -> Option<u32> {
+        let around = Around::new(&self.grid, [at[0] - d[0], at[1] - d[1]])?;
+        let (x, y) = around.nearest(self.older, Some(depth))?;
+        self.older.depth.data().get(y as usize * self.grid.cells[0] as usize + x as usize).copied()
+    }
+
     /// (1) of a cell.
     #[must_use]
     #[inline(always)]

@@ -5,16 +5,23 @@
 //!
 //! ```text
 //! (1) m    = D - c'(x)                       motion of its own, in the picture; D the motion field
-//! (2) d(p) = c(x, p) + m p
+//! (2) d(p) = c(x, p) + m p                   where m is small: it stands still, give or take
+//! (3) h(p) = h + (h - h') p                  where it is not: h = w (x, y, 1), h' of its place then
+//!     d(p) = c(h(p), p)
 //! ```
 //!
-//! A still point has m = 0 and follows the camera's path alone; one that moves keeps its own
-//! velocity on top. Where the field knows no motion a point is taken to be still; and so is the
-//! background where nothing was drawn (depth key 0), which engines leave without vectors.
+//! A still point has m = 0 and follows the camera's path alone. One that moves goes on through the
+//! world at constant velocity, (3): its place one span ago comes from where it was in the older
+//! picture and the depth that the older key has there. h, a pixel scaled by its distance, is linear
+//! in the place, so that no matrix has to be undone. Where the older key shows no such surface the
+//! point goes on along its motion vector. Where the field knows no motion a point is taken to be
+//! still; and so is the background where nothing was drawn (depth key 0), which engines leave without
+//! vectors.
 
 use super::camera_path::{Onward, Reprojection};
 use super::curve::Curve;
 use super::grid::Grid;
+use super::quadratic::Quadratic;
 use crate::key::{Camera, KeyFrame};
 use crate::time::MonoSpan;
 
@@ -27,6 +34,8 @@ const STILL_PX: f32 = 0.25;
 pub struct World {
     /// Since the older key: from the picture of the key to that one.
     older: Reprojection,
+    /// And back.
+    from_older: Reprojection,
     /// Until phases 1/2 and 1.
     half: Reprojection,
     one: Reprojection,
@@ -44,26 +53,51 @@ impl World {
         let per_depth_key = key.inverse_distance_per_depth_key?;
         Some(Self {
             older: super::camera_path::between(camera, older, key.valid)?,
+            from_older: super::camera_path::between(older, camera, key.valid)?,
             half: onward.reprojection(key.valid, span.scale(1, 2))?,
             one: onward.reprojection(key.valid, span)?,
             per_depth_key,
         })
     }
 
-    /// (2) of a cell. NaN where the point is not in front of the camera.
+    /// (2) or (3) of a cell; `older` reads the key before. NaN where the point is not in front of the
+    /// camera.
     #[must_use]
     #[inline(always)]
-    pub fn curve(&self, key: &KeyFrame, grid: &Grid, x: u32, y: u32) -> Curve {
+    pub fn curve(
+        &self,
+        key: &KeyFrame,
+        older: Option<&Quadratic<'_>>,
+        grid: &Grid,
+        x: u32,
+        y: u32,
+    ) -> Curve {
         let at = grid.centre(x, y);
         let depth = key.depth.at(x, y);
         let q = self.inverse_distance(depth);
         let displacement = if depth == 0 { [f32::NAN; 2] } else { key.displacement.at(x, y) };
-        let [own_x, own_y] = self.own_motion(at, q, displacement);
-        let (half, one) = (self.half.place(at, q), self.one.place(at, q));
-        Curve {
-            half: [half[0] - at[0] + 0.5 * own_x, half[1] - at[1] + 0.5 * own_y],
-            one: [one[0] - at[0] + own_x, one[1] - at[1] + own_y],
+        let own = self.own_motion(at, q, displacement);
+        if is_small(own) {
+            let (half, one) = (self.half.place(at, q), self.one.place(at, q));
+            return Curve {
+                half: [half[0] - at[0] + 0.5 * own[0], half[1] - at[1] + 0.5 * own[1]],
+                one: [one[0] - at[0] + own[0], one[1] - at[1] + own[1]],
+            };
         }
+        let before = older.and_then(|older| older.depth_before(at, displacement, depth));
+        let Some(before) = before.filter(|before| *before > 0) else {
+            return Curve::straight(displacement);
+        };
+        let was = [at[0] - displacement[0], at[1] - displacement[1]];
+        let then = self.from_older.scaled(was, self.inverse_distance(before));
+        let now = [at[0] / q, at[1] / q, 1.0 / q];
+        let seen = |by: &Reprojection, p: f32| {
+            let [x, y, w] = [0, 1, 2].map(|i| now[i] + (now[i] - then[i]) * p);
+            let w = if w > 0.0 { w } else { f32::NAN };
+            let place = by.place([x / w, y / w], 1.0 / w);
+            [place[0] - at[0], place[1] - at[1]]
+        };
+        Curve { half: seen(&self.half, 0.5), one: seen(&self.one, 1.0) }
     }
 
     /// 1 / w of a depth key.
@@ -88,6 +122,11 @@ impl World {
     pub fn is_still(&self, key: &KeyFrame, grid: &Grid, x: u32, y: u32) -> bool {
         let q = self.inverse_distance(key.depth.at(x, y));
         let own = self.own_motion(grid.centre(x, y), q, key.displacement.at(x, y));
-        (own[0].abs() < STILL_PX) & (own[1].abs() < STILL_PX)
+        is_small(own)
     }
+}
+
+#[inline(always)]
+fn is_small(own: [f32; 2]) -> bool {
+    (own[0].abs() < STILL_PX) & (own[1].abs() < STILL_PX)
 }

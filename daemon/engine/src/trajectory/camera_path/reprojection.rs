@@ -85,11 +85,24 @@ impl Reprojection {
     /// front of the camera.
     #[must_use]
     #[inline(always)]
-    pub fn place(&self, [x, y]: [f32; 2], q: f32) -> [f32; 2] {
-        let [to_x, to_y, to_w] = self.rows.map(|row| row.x * x + row.y * y + row.z + row.w * q);
+    pub fn place(&self, at: [f32; 2], q: f32) -> [f32; 2] {
+        let [to_x, to_y, to_w] = self.homogeneous(at, q);
         // Written so that NaN fails it, and without a branch.
         let w = if to_w > 1e-6 { to_w } else { f32::NAN };
         [to_x / w, to_y / w]
+    }
+
+    /// w' (x', y', 1) of the point seen at a pixel at inverse distance `q`, which is not 0, with w'
+    /// its distance from the other camera: linear in where the point is.
+    #[must_use]
+    #[inline(always)]
+    pub fn scaled(&self, at: [f32; 2], q: f32) -> [f32; 3] {
+        self.homogeneous(at, q).map(|h| h / q)
+    }
+
+    #[inline(always)]
+    fn homogeneous(&self, [x, y]: [f32; 2], q: f32) -> [f32; 3] {
+        self.rows.map(|row| row.x * x + row.y * y + row.z + row.w * q)
     }
 }
 
