@@ -13,7 +13,7 @@ use crate::trajectory::surface::is_same_surface;
 const REACH: u32 = 2;
 /// How much worse than the best the image's rung may be on a surface of a single sample; of several,
 /// this over their number.
-const DOUBT: f32 = 0.1;
+const DOUBT: f32 = 0.5;
 /// A cheaper rung may be worse than the best by this: the error of a tenth of a pixel,
 const TOLERANCE: f32 = 0.002_5;
 /// and this part of the best's own.

@@ -75,7 +75,7 @@ pub struct Sample {
 }
 
 /// The evidence of one stream, on the samples of its newest key.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Evidence {
     samples: Plane<Sample>,
     /// Those of the key before, while new ones are made.
@@ -85,6 +85,19 @@ pub struct Evidence {
     order_errors: Option<[f32; CameraOrder::ALL.len()]>,
     /// The rung of the image as a whole.
     image_rung: Rung,
+}
+
+impl Default for Evidence {
+    /// Nothing is known: of the rungs that need no history, the richest.
+    fn default() -> Self {
+        Self {
+            samples: Plane::default(),
+            older: Plane::default(),
+            order: CameraOrder::default(),
+            order_errors: None,
+            image_rung: Rung::Affine,
+        }
+    }
 }
 
 impl Evidence {

@@ -113,7 +113,7 @@ fn without_a_key_before_that_the_motion_leads_to_nothing_is_known() {
         let (ladder, _) = climbed(Method::Auto, [first(), second].into_iter());
         let samples = ladder.evidence().samples();
         assert!(samples.data().iter().all(|sample| sample.keys == 0));
-        assert_eq!(rung(&ladder, 60, 44), Rung::Linear);
+        assert_eq!(rung(&ladder, 60, 44), Rung::Affine);
     }
 }
 
