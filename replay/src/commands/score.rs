@@ -45,9 +45,9 @@ pub struct Args {
     /// that sends late cameras gets. Their rows say so.
     #[arg(long)]
     pub late_camera: bool,
-    /// Chart of speed against accuracy, FILE.svg or FILE.png.
+    /// Chart of speed against accuracy, FILE.svg or FILE.png; may be given for each.
     #[arg(long, value_name = "FILE", value_parser = plot::parse_plot)]
-    pub chart: Option<PathBuf>,
+    pub chart: Vec<PathBuf>,
     /// Page with everything: chart, tables, error over time, pictures to flip through.
     #[arg(long, value_name = "OUT.html")]
     pub report: Option<PathBuf>,
@@ -103,7 +103,7 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
     progress.finish_and_clear();
     let report = Report::new(options.threads.get(), scores);
     let mut text = report.to_text();
-    if let Some(path) = &args.chart {
+    for path in &args.chart {
         plot::write(&chart(&report)?, path)?;
         text += &format!("\nthe chart is in {}\n", path.display());
     }

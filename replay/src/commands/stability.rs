@@ -33,9 +33,9 @@ pub struct Args {
     /// Methods to compare besides hold: names with commas between, or all
     #[arg(long, value_name = "A,B", default_value = "all", value_parser = parse_methods)]
     pub methods: Methods,
-    /// One small chart per sweep, FILE.svg or FILE.png
+    /// One small chart per sweep, FILE.svg or FILE.png; may be given for each
     #[arg(long, value_name = "FILE", value_parser = plot::parse_plot)]
-    pub chart: Option<PathBuf>,
+    pub chart: Vec<PathBuf>,
     /// Page with the charts and all tables
     #[arg(long, value_name = "OUT.html")]
     pub report: Option<PathBuf>,
@@ -63,7 +63,7 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
     progress.finish_and_clear();
     let report = Report::new(PICTURE.width, PICTURE.height, sweeps);
     let mut text = report.to_text();
-    if let Some(path) = &args.chart {
+    for path in &args.chart {
         plot::write(&sweeps_chart(&report)?, path)?;
         text += &format!("\nthe charts are in {}\n", path.display());
     }

@@ -83,3 +83,21 @@ fn rows_of(sweep: &SweepReport, value: Value) -> Option<Vec<Vec<String>>> {
     let rows = sweep.methods().into_iter().map(&mut row).collect();
     (!is_empty).then_some(rows)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::report::tests::sweep;
+    use super::*;
+
+    #[test]
+    fn the_page_has_the_charts_the_worst_points_and_the_tables_that_a_sweep_has_values_for() {
+        let of = |has_event| {
+            page(&Report::new(192, 108, vec![sweep(&[(20.0, 15.0)], has_event)])).unwrap()
+        };
+        let html = of(false);
+        assert!(html.contains("<svg") && html.contains("<td>5.00</td>"), "{html}");
+        assert!(html.contains("Worse than hold: linear from at 0."), "{html}");
+        assert!(!html.contains("needed to recover"), "nothing happens in this sweep");
+        assert!(of(true).contains("<td>never</td>"), "linear does not recover");
+    }
+}

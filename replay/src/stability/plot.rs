@@ -44,3 +44,25 @@ pub fn plot(report: &Report) -> Result<Drawing, PictureError> {
         panel_px: PANEL_PX,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::report::tests::sweep;
+    use super::*;
+
+    #[test]
+    fn a_sweep_is_a_panel_with_a_line_per_method_and_nothing_above_the_highest_value() {
+        let sweeps = vec![sweep(&[(20.0, 30.0), (25.0, 100.0)], false); 5];
+        let svg = plot(&Report::new(192, 108, sweeps)).unwrap().to_svg();
+        // Lines of two methods in each panel, and of the legend.
+        assert_eq!(svg.matches("<polyline").count(), 5 * 2 + 2);
+        assert_eq!(svg.matches(">px per key interval</text>").count(), 5);
+        let tick = |label: &str| svg.contains(&format!(">{label}</text>"));
+        assert!(tick("50") && !tick("60") && !tick("100"), "{svg}");
+    }
+
+    #[test]
+    fn nothing_swept_is_an_error() {
+        assert!(plot(&Report::new(192, 108, Vec::new())).is_err());
+    }
+}

@@ -226,3 +226,59 @@ fn cell(method: &MethodPoint, point: &PointReport) -> String {
     };
     format!(" {:>9}", format!("{:.1}{recovery}", method.psnr_rgb_db))
 }
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// A sweep of points at which `hold` and `linear` reach so many decibels.
+    pub(in super::super) fn sweep(points: &[(f64, f64)], has_event: bool) -> SweepReport {
+        let method = |name, psnr_rgb_db, keys_to_recover| MethodPoint {
+            name,
+            interpolates: false,
+            psnr_rgb_db,
+            error_flicker: 1.5,
+            worst_tile_psnr_db: 4.0,
+            keys_to_recover,
+        };
+        let point = |(index, &(hold, linear)): (usize, &(f64, f64))| PointReport {
+            label: format!("at {index}"),
+            has_event,
+            methods: vec![
+                method(HOLD, hold, has_event.then_some(1)),
+                method("linear", linear, None),
+            ],
+        };
+        let points = points.iter().enumerate().map(point).collect();
+        SweepReport::new(Sweep::by_name("speed").unwrap(), points)
+    }
+
+    #[test]
+    fn a_method_is_worse_than_hold_from_the_first_point_where_it_is() {
+        let from = |points: &[(f64, f64)]| sweep(points, false).worse_than_hold[0].from.clone();
+        assert_eq!(from(&[(20.0, 30.0), (20.0, 20.0)]), None);
+        let crossing = [(20.0, 30.0), (20.0, 19.9), (20.0, 25.0)];
+        assert_eq!(from(&crossing).as_deref(), Some("at 1"));
+    }
+
+    #[test]
+    fn the_table_names_what_is_farther_below_hold_than_the_tolerance_the_worst_first() {
+        let points = [(20.0, 19.6), (20.0, 19.0), (20.0, 15.0), (20.0, 30.0)];
+        let report = Report::new(192, 108, vec![sweep(&points, false)]);
+        let below: Vec<_> = report.below_hold.iter().map(|at| at.point.as_str()).collect();
+        assert_eq!(below, ["at 2", "at 1"]);
+        let text = report.to_text();
+        assert!(
+            text.contains("linear      2 of 4 points: speed at 2 by 5.0 dB, speed at 1"),
+            "{text}"
+        );
+        assert!(text.contains("hold        0 of 4 points\n"), "{text}");
+    }
+
+    #[test]
+    fn recovery_is_told_where_there_is_an_event_and_never_is_a_dash() {
+        let text = |has_event| sweep(&[(20.0, 30.0)], has_event).to_text();
+        assert!(text(true).contains("20.0 r1") && text(true).contains("30.0 r-"), "{}", text(true));
+        assert!(!text(false).contains(" r"), "{}", text(false));
+    }
+}
