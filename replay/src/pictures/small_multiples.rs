@@ -294,13 +294,18 @@ fn draw_panel(drawing: &mut Drawing, panel: &Panel, placed: &Placed, [x, y]: [f3
             labels.taken.push([at[0] - 5.0, at[1] - 5.0, at[0] + 5.0, at[1] + 5.0]);
         }
     }
-    for point in &panel.points {
+    // What is ringed has the first choice of a place for its label, and lies over the others.
+    let (ringed, others): (Vec<_>, Vec<_>) = panel.points.iter().partition(|point| point.is_ringed);
+    for point in others.iter().chain(&ringed) {
         let Some(at) = placed.at(point.at) else { continue };
         if point.is_ringed {
             drawing.disc(at, 9.0, INK);
             drawing.disc(at, 7.0, PANEL);
         }
         point.look.draw_mark(drawing, at, 5.0);
+    }
+    for point in ringed.iter().chain(&others) {
+        let Some(at) = placed.at(point.at) else { continue };
         if let Some(label) = &point.label
             && let Some(place) = labels.place(label, at)
         {

@@ -176,7 +176,9 @@ impl Report {
     fn below_hold_text(&self) -> String {
         let mut text = format!("more than {TOLERANCE_DB} dB below hold\n");
         let points: usize = self.sweeps.iter().map(|sweep| sweep.points.len()).sum();
-        for method in self.sweeps.first().map(SweepReport::methods).unwrap_or_default() {
+        // Not every method takes part in every sweep.
+        let methods = self.sweeps.iter().map(SweepReport::methods).max_by_key(Vec::len);
+        for method in methods.unwrap_or_default() {
             let below: Vec<_> = self.below_hold.iter().filter(|at| at.method == method).collect();
             let worst: Vec<_> = below
                 .iter()
