@@ -349,6 +349,7 @@ pub(super) mod tests {
             "name",
             "backend",
             "interpolates",
+            "late_camera",
             "frames",
             "psnr_rgb_db",
             "psnr_y_db",
