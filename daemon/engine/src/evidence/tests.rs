@@ -196,3 +196,28 @@ fn a_late_pose_is_where_the_picture_goes() {
         }
     }
 }
+
+#[test]
+fn what_the_camera_chases_stays_where_it_is_in_the_picture() {
+    // The camera runs ahead and aside; an object keeps its distance from it, the ground does not.
+    let advance = |index: i64| {
+        let mut camera = camera(0.0, 0.0);
+        let s = index as f64;
+        let view = DMat4::from_translation(DVec3::new(-0.4 * s, 0.0, 1.5 * s));
+        camera.view = view.as_mat4().to_cols_array();
+        camera
+    };
+    let is_chased = |x: u32, y: u32| (90..110).contains(&x) && (60..80).contains(&y);
+    let keys = seen(advance).map(|key| KeyFrame {
+        displacement: plane(SIZE[0], SIZE[1], |x, y| {
+            if is_chased(x, y) { [0.0; 2] } else { key.displacement.at(x, y) }
+        }),
+        ..key
+    });
+    let (_, last) = climbed(Method::World, keys);
+    let (v, a) = (last.velocity.at(100, 70), last.acceleration.at(100, 70));
+    let moved = [f32::from(v.x) + 0.5 * f32::from(a.x), f32::from(v.y) + 0.5 * f32::from(a.y)];
+    assert!(moved.iter().all(|steps| steps.abs() < 3.0), "{moved:?} in 1/32 pixel");
+    let ground = last.velocity.at(20, 20);
+    assert!(ground.x.abs() > 32, "the ground goes by: {ground:?}");
+}
