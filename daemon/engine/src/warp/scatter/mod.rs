@@ -21,6 +21,7 @@
 
 mod gpu;
 mod one_by_one;
+mod runs;
 mod source;
 #[cfg(test)]
 mod tests;

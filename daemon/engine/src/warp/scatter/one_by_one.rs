@@ -48,7 +48,7 @@ fn for_each_splat(source: &SourceField, scale: [i32; 2], mut splat: impl FnMut(u
 /// Calls `splat(column, row, depth key, candidate of (3))` for the 2x2 cells around where source
 /// cell (`x`, `y`) lands, which may lie outside the grid: above and left of it numbers wrap.
 #[inline(always)]
-pub(super) fn for_each_corner(
+fn for_each_corner(
     source: &SourceField,
     scale: [i32; 2],
     [x, y]: [u32; 2],

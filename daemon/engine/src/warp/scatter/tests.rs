@@ -107,26 +107,37 @@ fn patches(size: [u32; 2], patch: u32, reach: u32) -> KeyFrame {
 }
 
 #[test]
-fn far_and_near_movers_are_splatted_like_cells_one_by_one_whatever_it_costs() {
-    // Windows of a few cells, windows too wide to look through, and no windows at all.
-    for (reach, are_windows, are_wide) in [(1, true, false), (60, true, true), (1000, false, true)]
-    {
+fn near_and_far_movers_are_splatted_like_cells_one_by_one_whichever_way_is_taken() {
+    for (reach, looks) in [(1, true), (20, false), (1000, false)] {
         let key = patches([800, 300], 24, reach);
         let (pool, map) = (pool(2), map_of(&key));
         let mut source = SourceField::default();
         source.update(&pool, &key);
         let mut scratch = ScatterScratch::default();
-        assert_eq!(
-            scratch.note_windows(&source, [Phase::ONE.q12(); 2]),
-            are_windows,
-            "windows, {reach}"
-        );
-        assert_eq!(scratch.has_wide_window(), are_wide, "{reach}");
+        let scale = [Phase::ONE.q12(); 2];
+        assert_eq!(scratch.find_windows(&source, scale), looks, "up to {reach} pixels");
         let [mut top, mut splat, mut expected] = [(); 3].map(|()| Plane::default());
         scatter_one_by_one(&source, &map, Phase::ONE, &mut top, &mut expected);
         scatter(&pool, &source, &map, Phase::ONE, &mut scratch, &mut splat);
         assert!(splat == expected, "patches that move by up to {reach} pixels");
     }
+}
+
+#[test]
+fn one_fast_mover_widens_the_windows_around_it_and_no_others() {
+    let mut key = patches([800, 300], 24, 1);
+    for y in 100..120 {
+        key.velocity.row_mut(y)[300..330].fill(Velocity { x: 12 * 32, y: -6 * 32 });
+    }
+    let (pool, map) = (pool(2), map_of(&key));
+    let mut source = SourceField::default();
+    source.update(&pool, &key);
+    let mut scratch = ScatterScratch::default();
+    assert!(scratch.find_windows(&source, [Phase::ONE.q12(); 2]));
+    let [mut top, mut splat, mut expected] = [(); 3].map(|()| Plane::default());
+    scatter_one_by_one(&source, &map, Phase::ONE, &mut top, &mut expected);
+    scatter(&pool, &source, &map, Phase::ONE, &mut scratch, &mut splat);
+    assert!(splat == expected);
 }
 
 #[test]

@@ -4,6 +4,7 @@
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 
+use std::cell::RefCell;
 use std::ops::Range;
 
 use super::source::{SourceField, TILE};
@@ -12,8 +13,6 @@ use super::{NO_SOURCE, SOURCE_BITS, shift};
 #[cfg(target_arch = "x86_64")]
 use crate::simd::has_avx2;
 
-/// Most source cells that each target cell looks at.
-pub(super) const MAX_CANDIDATES: usize = 32;
 /// Columns of a tile.
 const COLUMNS: usize = TILE[0] as usize;
 
@@ -59,7 +58,8 @@ fn source_rows(target: &Target<'_>, window: &Window, y: u32) -> Range<u32> {
 fn look_anywhere(target: &Target<'_>, window: &Window, splat: &mut [u32]) {
     let size = [target.source.velocity.width(), target.source.velocity.height()];
     let columns = target.start[0] as usize..target.end[0] as usize;
-    let mut found = [NOTHING; MAX_CANDIDATES];
+    let mut found = FOUND.take();
+    found.resize(window.candidates().max(found.len()), NOTHING);
     let rows = splat.chunks_mut(size[0] as usize).zip(target.start[1]..target.end[1]);
     for (splat, y) in rows {
         let splat = &mut splat[columns.clone()];
@@ -96,6 +96,12 @@ fn look_anywhere(target: &Target<'_>, window: &Window, splat: &mut [u32]) {
             }
         }
     }
+    FOUND.set(found);
+}
+
+thread_local! {
+    /// Kept from tile to tile.
+    static FOUND: RefCell<Vec<Candidates>> = const { RefCell::new(Vec::new()) };
 }
 
 /// The part of `columns` whose cells lie inside a grid of `width` columns when moved left by

@@ -10,7 +10,9 @@ use std::arch::x86_64::{
     _mm256_storeu_si256, _mm256_sub_epi32,
 };
 
-use super::{COLUMNS, MAX_CANDIDATES, Target, source_rows};
+use std::cell::RefCell;
+
+use super::{COLUMNS, Target, source_rows};
 use crate::key::Velocity;
 use crate::warp::scatter::SOURCE_BITS;
 use crate::warp::scatter::tiles::Window;
@@ -47,7 +49,8 @@ pub(super) fn look(target: &Target<'_>, window: &Window, splat: &mut [u32]) -> b
     }
     let scale = target.scale.map(|scale| _mm256_set1_epi32(scale | scale << 16));
     // Of each candidate: the depth key, 0 where it does not land, and the rank, all ones there.
-    let mut found = [[[_mm256_setzero_si256(); 2]; STEPS]; MAX_CANDIDATES];
+    let mut found = FOUND.take();
+    found.resize(window.candidates().max(found.len()), [[_mm256_setzero_si256(); 2]; STEPS]);
     for (splat, y) in splat.chunks_mut(width as usize).zip(target.start[1]..target.end[1]) {
         let mut count = 0;
         let mut top = [_mm256_setzero_si256(); STEPS];
@@ -78,7 +81,13 @@ pub(super) fn look(target: &Target<'_>, window: &Window, splat: &mut [u32]) -> b
             unsafe { _mm256_storeu_si256(splat.as_mut_ptr().cast(), best) };
         }
     }
+    FOUND.set(found);
     true
+}
+
+thread_local! {
+    /// Kept from tile to tile.
+    static FOUND: RefCell<Vec<[[__m256i; 2]; STEPS]>> = const { RefCell::new(Vec::new()) };
 }
 
 impl Row<'_> {
