@@ -7,7 +7,7 @@ mod daemon_fixture;
 use daemon_fixture::child::{ChildProcess, Role, run_if_asked};
 use daemon_fixture::{Client, RunningDaemon, private_folder};
 use foreframe_engine::MonoSpan;
-use foreframed::capture::Capture;
+use foreframed::capture::{Capture, DISPLAY_ORIGIN};
 use foreframed::clock;
 use rustix::process::Signal;
 use std::os::unix::fs::PermissionsExt as _;
@@ -93,6 +93,9 @@ fn a_daemon_that_stops_finishes_its_recording() {
     }
     daemon.stop();
     let capture = Capture::open(&daemon.path("a.mcap")).unwrap();
+    let origin: u64 = capture.session().config[DISPLAY_ORIGIN].parse().unwrap();
+    let arrived_at = capture.frame(0).map_or(u64::MAX, |frame| frame.arrived_at_ns);
+    assert!((1..arrived_at).contains(&origin), "a refresh before the first key, for replay");
     let info = capture.info().unwrap();
     assert!(!info.is_truncated());
     assert_eq!(info.frames as u64 + info.gaps, 4, "every key is there, or counted as missing");

@@ -37,6 +37,6 @@ pub use layout::pixel_layout;
 pub use reader::{Capture, CapturedFrame, CapturedPlane, FrameTimes};
 pub use record::PlaneInfo;
 pub use schema::VERSION;
-pub use session::{CaptureSource, Gap, PIXELS_PER_DEGREE, SessionInfo};
+pub use session::{CaptureSource, DISPLAY_ORIGIN, Gap, PIXELS_PER_DEGREE, SessionInfo};
 pub use source::ReadAt;
 pub use writer::CaptureWriter;

@@ -31,7 +31,7 @@ use foreframe_protocol::socket::{Listener, default_socket_path};
 use foreframe_protocol::{EndReason, Features, Goodbye};
 use tracing::{info, warn};
 
-use crate::capture::{CaptureSource, PIXELS_PER_DEGREE, SessionInfo};
+use crate::capture::{CaptureSource, DISPLAY_ORIGIN, PIXELS_PER_DEGREE, SessionInfo};
 use crate::clock;
 use crate::config::{Config, SinkSpec};
 use crate::gpu::Gpus;
@@ -103,8 +103,12 @@ impl Daemon {
             None => default_socket_path()?,
         };
         let listener = Listener::bind(&path)?;
+        let display_origin = clock::now();
         let recorder = match &config.record {
-            Some(file) => Some(Recorder::start(file, &session_info(&config), config.stop_within)?),
+            Some(file) => {
+                let session = session_info(&config, display_origin);
+                Some(Recorder::start(file, &session, config.stop_within)?)
+            }
             None => None,
         };
         let event_loop = EventLoop::try_new().context("making the main loop")?;
@@ -135,7 +139,7 @@ impl Daemon {
             streams: BTreeMap::new(),
             next_ordinal: 0,
             events,
-            display_origin: clock::now(),
+            display_origin,
             gpus: Arc::new(gpus),
             reaper,
             allocator,
@@ -260,7 +264,7 @@ where
         .map_err(|error| anyhow::Error::from(error.error).context("watching an event source"))
 }
 
-fn session_info(config: &Config) -> SessionInfo {
+fn session_info(config: &Config, display_origin: MonoTime) -> SessionInfo {
     let name = config.record.as_deref().map(stem).unwrap_or_default();
     let session = SessionInfo::new(name, CaptureSource::Live);
     let session = match config.pixels_per_degree {
@@ -270,6 +274,7 @@ fn session_info(config: &Config) -> SessionInfo {
     session
         .with_config("method", config.method)
         .with_config("refresh_interval_ns", config.refresh_interval.as_ns())
+        .with_config(DISPLAY_ORIGIN, display_origin.as_ns())
         .with_config("sink", &config.sink)
         .with_config("threads", config.threads)
 }

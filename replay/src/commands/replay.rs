@@ -117,6 +117,7 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
         gpu: gpu::open(&args.backend).context("--backend")?,
         threads: args.threads.unwrap_or_else(all_processors),
         refresh_interval,
+        display_origin: if args.step { None } else { recording.display_origin()? },
         pixels_per_degree: match args.ppd {
             #[expect(clippy::cast_possible_truncation, reason = "a number of 1 to 1000")]
             Some(ppd) => Some(ppd as f32),

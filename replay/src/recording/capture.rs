@@ -10,7 +10,7 @@ use anyhow::Context as _;
 use foreframe_engine::{KeyInput, MonoTime, PlaneInput, StreamFormat};
 use foreframe_protocol::{PlaneDescriptor, PlaneKind, Submit};
 use foreframed::capture::{
-    Capture, CaptureInfo, CapturedPlane, PIXELS_PER_DEGREE, PlaneInfo, ReadAt,
+    Capture, CaptureInfo, CapturedPlane, DISPLAY_ORIGIN, PIXELS_PER_DEGREE, PlaneInfo, ReadAt,
 };
 use foreframed::ingest::{self, PlaneSource};
 
@@ -107,6 +107,24 @@ impl<S: ReadAt> CaptureRecording<S> {
             format!("{PIXELS_PER_DEGREE} of the session: expected 1 to 1000, found `{text}`")
         })?;
         Ok(Some(ppd))
+    }
+
+    /// A refresh of the display that the daemon worked with when it recorded. None where the capture
+    /// comes from elsewhere.
+    ///
+    /// # Errors
+    /// If it is not a time before the first key arrived.
+    pub fn display_origin(&self) -> anyhow::Result<Option<MonoTime>> {
+        let Some(text) = self.capture.session().config.get(DISPLAY_ORIGIN) else {
+            return Ok(None);
+        };
+        let first = self.heads.first().map_or(MonoTime::ZERO, |head| head.arrived_at);
+        let origin = text.parse().ok().map(MonoTime::from_ns).filter(|origin| *origin <= first);
+        let origin = origin.with_context(|| {
+            let first = first.as_ns();
+            format!("{DISPLAY_ORIGIN} of the session: expected 0 to {first}, found `{text}`")
+        })?;
+        Ok(Some(origin))
     }
 
     /// What a user should know about the file before trusting a result: one line each.

@@ -30,6 +30,8 @@ pub struct ReplayConfig {
     pub threads: NonZeroUsize,
     /// Period of the display.
     pub refresh_interval: MonoSpan,
+    /// A refresh of the display, not after the first arrival; None has one at the first arrival.
+    pub display_origin: Option<MonoTime>,
     /// Angular size of a pixel, which turns on damping of motion that no eye can follow.
     pub pixels_per_degree: Option<f32>,
 }
@@ -165,7 +167,7 @@ impl VirtualStream {
                     ..EngineConfig::new(config.method, config.threads)
                 },
                 refresh_interval,
-                display_origin: origin,
+                display_origin: config.display_origin.unwrap_or(origin),
             },
         );
         if let Some(gpu) = &config.gpu {

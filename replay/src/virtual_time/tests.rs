@@ -51,6 +51,7 @@ fn replayed_plan(
         gpu: None,
         threads: count(threads),
         refresh_interval: MonoSpan::from_hz(refresh_hz),
+        display_origin: None,
         pixels_per_degree: None,
     };
     let mut digester = FrameDigester::default();
@@ -185,6 +186,35 @@ fn a_key_that_the_engine_refuses_is_reported_and_the_others_are_shown() {
 }
 
 #[test]
+fn refreshes_lie_where_the_recording_says() {
+    let mut recording = recording();
+    let plan = Plan::new(&recording.heads, count(4));
+    let reader = KeyReader::new(recording.format(), &plan).unwrap();
+    let first = recording.heads[0].arrived_at;
+    let (refresh_interval, before) = (MonoSpan::from_ms(10), MonoSpan::from_ms(3));
+    for (display_origin, expected) in [(None, 0), (Some(first - before), 7_000_000)] {
+        let config = ReplayConfig {
+            method: Method::Hold,
+            gpu: None,
+            threads: count(1),
+            refresh_interval,
+            display_origin,
+            pixels_per_degree: None,
+        };
+        let keys = timed_keys(&mut recording, &reader, &plan, KeyTiming::AsRecorded);
+        let mut shown = 0;
+        let losses = replay(*reader.format(), &config, keys, |frame, _| {
+            let after = (frame.present_at - first).as_ns();
+            assert_eq!(after % refresh_interval.as_ns(), expected, "{display_origin:?}");
+            shown += 1;
+            Ok(())
+        });
+        assert_eq!(losses.unwrap().refused, [""; 0]);
+        assert!(shown > 5, "{shown}");
+    }
+}
+
+#[test]
 fn an_error_of_the_sink_ends_the_replay() {
     let mut recording = recording();
     let plan = Plan::new(&recording.heads, count(4));
@@ -194,6 +224,7 @@ fn an_error_of_the_sink_ends_the_replay() {
         gpu: None,
         threads: count(1),
         refresh_interval: MonoSpan::from_hz(60.0),
+        display_origin: None,
         pixels_per_degree: None,
     };
     let keys = timed_keys(&mut recording, &reader, &plan, KeyTiming::Stepped);
@@ -222,6 +253,7 @@ fn what_is_repeated_is_the_picture_that_was_shown_and_not_one_that_was_dropped()
         gpu: None,
         threads: count(1),
         refresh_interval: MonoSpan::from_hz(100.0),
+        display_origin: None,
         pixels_per_degree: None,
     };
     let keys = timed_keys(&mut recording, &reader, &plan, KeyTiming::Stepped);
