@@ -152,3 +152,12 @@ fn a_path_that_does_not_exist_would_be_found() {
     assert_eq!(paths, ["daemon/nowhere.rs"]);
     assert!(!root().join(&paths[0]).exists());
 }
+
+#[test]
+fn the_readme_tells_of_every_method() {
+    let readme = include_str!("../../README.md");
+    for method in foreframe_engine::Method::ALL {
+        let row = format!("| `{method}` |");
+        assert!(readme.contains(&row), "README.md: expected a row `{row}` in its table of methods");
+    }
+}

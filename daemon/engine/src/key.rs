@@ -27,8 +27,8 @@ pub enum Pixels<'a> {
 
 /// Reads pixels out of memory that may change: every byte that is used is copied before.
 ///
-/// The engine reads each row once, some rows of depth twice where it works out the camera's
-/// motion, on several threads at once.
+/// The engine reads rows on several threads at once; a row of a plane that is coarser than the
+/// field grid once per row of the grid, and depth twice where the camera's motion is worked out.
 pub trait ReadPixels: Sync + std::fmt::Debug {
     /// Bytes from the first pixel to the end of the last.
     fn byte_count(&self) -> u64;

@@ -136,7 +136,7 @@ impl Mailbox {
     }
 
     /// Puts a late camera in; of two the newer content time stays. Nobody is woken: the next picture
-    /// is planned anyway, and looks.
+    /// looks, and a stream that has none planned waits for its next key.
     pub fn put_late_camera(&self, pose: LateCamera) {
         let mut state = self.lock();
         let is_newer =

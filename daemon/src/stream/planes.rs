@@ -1,6 +1,6 @@
 //! The planes of a key on their way out of its slot.
 //!
-//! Each byte is copied out of shared memory once before it is used. The engine does that itself,
+//! Every byte is copied out of shared memory before it is used. The engine does that itself,
 //! row by row, while it converts ([`SlotPlanes`]); where a recorder needs the planes as they came,
 //! they are copied whole, and the copy is read by engine and recorder alike ([`PlaneCopier`]).
 

@@ -61,7 +61,7 @@ impl RateDoubt {
         let is_next = is_next < announced && is_next > -announced;
         let near = announced.scale(NEAR_PERCENT, 100);
         let is_near = is_next && answer.residual < near && answer.residual > -near;
-        self.near_in_a_row = if is_near { self.near_in_a_row + 1 } else { 0 };
+        self.near_in_a_row = if is_near { self.near_in_a_row.saturating_add(1) } else { 0 };
         self.is_settled |= self.near_in_a_row >= ANSWERS_TO_SETTLE;
         if self.is_settled {
             return None;

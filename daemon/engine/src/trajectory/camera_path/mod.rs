@@ -61,6 +61,9 @@ pub struct Pose {
 
 /// Content times that differ by no more are one.
 const SAME_TIME: MonoSpan = MonoSpan::from_us(2);
+/// Least time to a late pose. The last bit of a view is 6e-8: over 1 ms, and then on for a key
+/// interval, that is 1e-6 rad.
+const CLOSEST: MonoSpan = MonoSpan::from_ms(1);
 /// Poses that (1) to (3) need.
 const KEPT: usize = 3;
 
@@ -118,9 +121,10 @@ impl CameraPath {
     }
 
     /// How the camera gets from its newest pose to `late`, at a constant twist, and on from there.
+    /// None where they are so close in time that the rounding of their views would be a velocity.
     #[must_use]
     pub fn towards(&self, late: &Pose) -> Option<Onward> {
-        let newest = self.poses.last()?;
+        let newest = self.poses.last().filter(|newest| late.time - newest.time >= CLOSEST)?;
         let (twist, _) = mean_twist(newest, late)?;
         Some(Onward { newest: *newest, twist, change: Twist::default() })
     }

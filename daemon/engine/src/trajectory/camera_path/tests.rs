@@ -126,3 +126,16 @@ fn a_late_pose_is_met_exactly() {
     let onward = path.towards(&late).unwrap();
     assert!(error(&onward, &path.newest().unwrap().camera, &late.camera) < 0.01);
 }
+
+#[test]
+fn a_late_pose_at_the_newest_ones_time_is_not_a_velocity() {
+    let mut path = CameraPath::default();
+    path.push(pose(0, &twist([0.0; 3], [0.0; 3]), &Twist::default()));
+    let newest = *path.newest().unwrap();
+    let mut late = newest;
+    late.camera.view[1] += 6e-8;
+    late.time = newest.time + MonoSpan::from_us(10);
+    assert!(path.towards(&late).is_none());
+    late.time = newest.time + MonoSpan::from_ms(5);
+    assert!(path.towards(&late).is_some());
+}

@@ -140,11 +140,14 @@ impl<'a> Frame<'a> {
     /// If the planes of `field` are not of the size that `map` is of.
     fn new(field: &'a LinearScratch, map: &'a FieldMap, valid: Rect, phase: Phase) -> Self {
         let cells = [map.x.cells(), map.y.cells()];
-        let size = |width, height| [width, height] == cells;
         let source = &field.source;
-        let has_size = size(source.depth.width(), source.depth.height())
-            && size(source.velocity.width(), source.velocity.height());
-        assert!(has_size, "the key's field has {cells:?} cells");
+        let sizes = [
+            [source.depth.width(), source.depth.height()],
+            [source.velocity.width(), source.velocity.height()],
+            [field.carried.width(), field.carried.height()],
+            [field.class.width(), field.class.height()],
+        ];
+        assert_eq!(sizes, [cells; 4], "every plane of the field has the size of its grid");
         Self { field, map, valid, phase, one_cell: one_cell(map) }
     }
 

@@ -18,10 +18,12 @@ const LANES: usize = 8;
 /// (1) for a row of splats, as many as whole steps hold; returns their number.
 ///
 /// # Panics
-/// If the rows are not of one length, or a splat names a source beyond `velocities`.
+/// If the rows are not of one length, there are no velocities, or a splat names a source beyond
+/// them.
 #[target_feature(enable = "avx2")]
 pub(super) fn resolve(velocities: &[Velocity], splats: &[u32], carried: &mut [[i16; 2]]) -> usize {
     assert_eq!(splats.len(), carried.len(), "rows of one length");
+    assert!(!velocities.is_empty(), "a grid has cells");
     let last = i32::try_from(velocities.len()).expect("a grid has at most 2^25 cells") - 1;
     let last = _mm256_set1_epi32(last);
     let hole = _mm256_set1_epi32(zerocopy::transmute!(HOLE));
@@ -35,7 +37,8 @@ pub(super) fn resolve(velocities: &[Velocity], splats: &[u32], carried: &mut [[i
         let beyond = _mm256_andnot_si256(is_hole, _mm256_cmpgt_epi32(source, last));
         is_beyond = _mm256_or_si256(is_beyond, beyond);
         let source = _mm256_min_epi32(source, last);
-        // SAFETY: no source is below 0 or beyond the last velocity, which has 4 bytes.
+        // SAFETY: 25 bits are not below 0, and nothing is beyond the last velocity, of which there
+        // is one; it has 4 bytes.
         let velocity = unsafe { _mm256_i32gather_epi32::<4>(velocities.as_ptr().cast(), source) };
         let shown = _mm256_blendv_epi8(velocity, hole, is_hole);
         // SAFETY: there are 8 times two values of 16 bits, and the store needs no alignment.

@@ -18,6 +18,9 @@ use crate::plane::Plane;
 
 /// Most source cells that a target cell looks at, on average. About as many take as long as a splat.
 const MOST_CANDIDATES: usize = 14;
+/// Most source cells that any target cell looks at: one thread works on a tile, and remembers what
+/// it found.
+const WIDEST: usize = 1024;
 
 /// Buffers of [`scatter`], kept from frame to frame.
 #[derive(Clone, Debug, Default)]
@@ -123,7 +126,8 @@ impl ScatterScratch {
                 }
             }
         }
-        let candidates = windows.iter().map(Window::candidates);
-        candidates.fold(0, usize::saturating_add) <= MOST_CANDIDATES * windows.len()
+        let candidates = || windows.iter().map(Window::candidates);
+        candidates().all(|count| count <= WIDEST)
+            && candidates().sum::<usize>() <= MOST_CANDIDATES * windows.len()
     }
 }

@@ -203,7 +203,8 @@ fn cell_of(axis: &FieldAxis, pixel: __m256i) -> __m256i {
 #[inline]
 #[target_feature(enable = "avx2")]
 fn gather(plane: &Plane<[i16; 2]>, y: u32, columns: __m256i) -> __m256i {
-    // SAFETY: the caller clamped to the row, whose elements have 4 bytes.
+    // SAFETY: the columns are those of broken cells, which `Frame::new` found to be as many as the
+    // row has, and their neighbours, clamped to it; its elements have 4 bytes.
     unsafe { _mm256_i32gather_epi32::<4>(plane.row(y).as_ptr().cast(), columns) }
 }
 
