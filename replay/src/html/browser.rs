@@ -11,8 +11,10 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 const NAMES: [&str; 4] =
     ["chromium-headless-shell", "chromium", "chromium-browser", "google-chrome"];
-/// The page has so long, of its own clock, to do what the script asks.
-const BUDGET_MS: u32 = 20_000;
+/// The page has so long, of its own clock, to do what the script asks. That clock runs ahead while
+/// pictures are decoded: a script that looks every millisecond has looked this often by then, which
+/// is longer than a busy machine takes.
+const BUDGET_MS: u32 = 1_000_000;
 
 static SKIPPED: AtomicU32 = AtomicU32::new(0);
 
