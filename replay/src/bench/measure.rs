@@ -51,6 +51,8 @@ pub(super) fn time_case(
     let mut times = Times::default();
     let interval = MonoSpan::from_secs_f64(KEY_INTERVAL_S);
     let frames = settings.frames.get() as i64;
+    // A method that interpolates has work between the keys before, and none after the newest.
+    let behind = if method.interpolates() { interval } else { MonoSpan::ZERO };
     let mut index = 0;
     let mut take_key = || -> anyhow::Result<Vec<MonoTime>> {
         let content_time = MonoTime::from_ns(1_000_000_000) + interval.scale(index as i64, 1);
@@ -64,7 +66,8 @@ pub(super) fn time_case(
         engine.push_key(&input)?;
         ends.push(clock::now());
         for frame in 1..=frames {
-            engine.synthesise(content_time + interval.scale(frame, frames + 1), &mut out);
+            let shown = content_time + interval.scale(frame, frames + 1) - behind;
+            engine.synthesise(shown, &mut out);
             ends.push(clock::now());
         }
         Ok(ends)

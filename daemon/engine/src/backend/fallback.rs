@@ -67,13 +67,21 @@ impl Backend {
         key: &KeyFrame,
         map: &FieldMap,
     ) {
-        if let Some(gpu) = &mut self.gpu {
-            match gpu.take_key(key, map) {
-                Ok(()) => return,
-                Err(error) => self.fall(&error),
+        if !self.did_gpu(|gpu| gpu.take_key(key, map)) {
+            self.cpu.take_key(pool, method, key);
+        }
+    }
+
+    /// Whether there is a GPU and `step` went well on it.
+    fn did_gpu(&mut self, step: impl FnOnce(&mut GpuBackend) -> Result<(), GpuError>) -> bool {
+        let Some(gpu) = &mut self.gpu else { return false };
+        match step(gpu) {
+            Ok(()) => true,
+            Err(error) => {
+                self.fall(&error);
+                false
             }
         }
-        self.cpu.take_key(pool, method, key);
     }
 
     /// Takes the field of the key that was taken last again: its trajectories have changed.
@@ -84,13 +92,9 @@ impl Backend {
         key: &KeyFrame,
         map: &FieldMap,
     ) {
-        if let Some(gpu) = &mut self.gpu {
-            match gpu.take_field(key, map) {
-                Ok(()) => return,
-                Err(error) => self.fall(&error),
-            }
+        if !self.did_gpu(|gpu| gpu.take_field(key, map)) {
+            self.cpu.take_key(pool, method, key);
         }
-        self.cpu.take_key(pool, method, key);
     }
 
     /// Makes a picture after the key that was taken last into `out`, which has the size and format

@@ -56,6 +56,11 @@ pub(super) fn run(
 ) -> anyhow::Result<()> {
     let duration = MonoSpan::from_secs_f64(seconds);
     if let Some(path) = picture {
+        let least = PLOTTED_UNTIL.as_secs_f64();
+        anyhow::ensure!(
+            seconds >= least,
+            "--seconds: expected at least {least}, where the picture ends, found {seconds}"
+        );
         draw(duration, seed, path)?;
     }
     let comparison = compare(seconds, seed);
