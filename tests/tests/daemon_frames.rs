@@ -3,7 +3,7 @@
 mod daemon_fixture;
 
 use daemon_fixture::RunningDaemon;
-use foreframe_protocol::{DaemonMessage, DestroyStream, OutputKind, OutputReleased};
+use foreframe_protocol::{DaemonMessage, DestroyStream, LateCamera, OutputKind, OutputReleased};
 
 const RED: [u8; 4] = [255, 0, 0, 255];
 const GREEN: [u8; 4] = [0, 255, 0, 255];
@@ -183,4 +183,29 @@ fn a_subscription_that_is_taken_back_at_once_leaves_no_pool_and_can_be_made_agai
     client.submit(&mut source, RED);
     let frame = client.expect_frame(&screen);
     assert_eq!(screen.pixels(&frame), RED.repeat(64));
+}
+
+#[test]
+fn a_recording_holds_the_poses_that_led_pictures() {
+    let args = foreframed::Args { record: Some("a.mcap".into()), ..Default::default() };
+    let mut daemon = RunningDaemon::start_with("null", args);
+    let mut client = daemon.connect();
+    let mut source = client.open_stream(1, 8, 8);
+    let first = client.submit(&mut source, RED);
+    client.expect_presented(&first);
+    let mut view = [0.0; 16];
+    for diagonal in [0, 5, 10, 15] {
+        view[diagonal] = 1.0;
+    }
+    let content_time_ns = first.content_time_ns + 1;
+    let pose = LateCamera { stream: 1, content_time_ns, view };
+    client.send(pose);
+    let second = client.submit(&mut source, GREEN);
+    client.expect_presented(&second);
+    daemon.stop();
+    let capture = foreframed::capture::Capture::open(&daemon.path("a.mcap")).unwrap();
+    let [found] = capture.late_cameras() else { panic!("{:?}", capture.late_cameras()) };
+    assert_eq!((found.pose.content_time_ns, found.pose.view), (content_time_ns, view));
+    let arrivals: Vec<_> = capture.times().map(|times| times.arrived_at_ns).collect();
+    assert!((arrivals[0]..=arrivals[1]).contains(&found.arrived_at_ns), "{arrivals:?}");
 }

@@ -2,7 +2,7 @@
 //!
 //! Chunks are uncompressed, carry a CRC, are built in memory and written once, and the file is
 //! flushed after each, so a crash costs at most the chunk that was being written. What the bytes
-//! of stream and submit messages mean is the business of [`super::writer`].
+//! of stream, submit and late-camera messages mean is the business of [`super::writer`].
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -126,6 +126,18 @@ impl<W: Write> Container<W> {
     pub(super) fn gap(&mut self, gap: &Gap) -> Result<(), CaptureError> {
         let text = serde_json::to_vec(gap).expect("strings and integers become JSON");
         self.message(Topic::Gap, at(gap.to_ns), &text)?;
+        Ok(self.mcap.flush()?)
+    }
+
+    pub(super) fn late_camera(
+        &mut self,
+        stream: u32,
+        stamp: Stamp,
+        pose: &[u8],
+    ) -> Result<(), CaptureError> {
+        let mut body = pose.to_vec();
+        record::seal(&mut body);
+        self.message(Topic::LateCamera(stream), stamp, &body)?;
         Ok(self.mcap.flush()?)
     }
 

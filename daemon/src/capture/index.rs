@@ -11,7 +11,7 @@
 use std::collections::BTreeMap;
 use std::io;
 
-use foreframe_protocol::PlaneMap;
+use foreframe_protocol::{LateCamera, PlaneMap};
 use mcap::records::{Record, op};
 
 use super::error::CaptureError;
@@ -61,6 +61,17 @@ pub(super) struct FrameEntry {
     pub(super) planes: Vec<Span>,
 }
 
+/// A pose that arrived after a key frame.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct CapturedPose {
+    /// Position of its stream in [`super::Capture::streams`].
+    pub stream: usize,
+    /// When it arrived, nanoseconds of the monotonic clock.
+    pub arrived_at_ns: u64,
+    /// The pose.
+    pub pose: LateCamera,
+}
+
 /// A run of bytes in the file.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Span {
@@ -99,6 +110,7 @@ pub(super) struct Index {
     pub(super) session: SessionInfo,
     pub(super) streams: Vec<StreamEntry>,
     pub(super) frames: Vec<FrameEntry>,
+    pub(super) late_cameras: Vec<CapturedPose>,
     pub(super) gaps: Vec<Gap>,
     pub(super) planes: PlaneMap<PlaneStatistics>,
     pub(super) size: u64,

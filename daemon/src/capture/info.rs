@@ -58,6 +58,8 @@ pub struct StreamInfo {
     pub create: CreateStream,
     /// Whole frames.
     pub frames: usize,
+    /// Poses that arrived after a key frame.
+    pub late_cameras: usize,
 }
 
 impl CaptureInfo {
@@ -96,6 +98,11 @@ impl CaptureInfo {
                 .map(|(position, create)| StreamInfo {
                     create: *create,
                     frames: index.frames.iter().filter(|frame| frame.stream == position).count(),
+                    late_cameras: index
+                        .late_cameras
+                        .iter()
+                        .filter(|pose| pose.stream == position)
+                        .count(),
                 })
                 .collect(),
             size_bytes: index.size,

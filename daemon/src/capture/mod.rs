@@ -31,7 +31,7 @@ pub use codec::{Codec, Coding, Filter, plane_hash};
 pub use container::PlaneBytes;
 pub use error::CaptureError;
 pub use filter::PixelLayout;
-pub use index::Damage;
+pub use index::{CapturedPose, Damage};
 pub use info::{CaptureInfo, PlanesInfo, StreamInfo};
 pub use layout::pixel_layout;
 pub use reader::{Capture, CapturedFrame, CapturedPlane, FrameTimes};

@@ -11,7 +11,7 @@ use foreframe_protocol::{Body as _, CreateStream, PlaneKind, StreamFormat, Submi
 
 use super::codec;
 use super::error::CaptureError;
-use super::index::{FrameEntry, Index, Span};
+use super::index::{CapturedPose, FrameEntry, Index, Span};
 use super::info::CaptureInfo;
 use super::record::{BadRecord, FrameRecord, PlaneEntry, PlaneInfo};
 use super::session::{Gap, SessionInfo};
@@ -150,6 +150,12 @@ impl<S: ReadAt> Capture<S> {
             arrived_at_ns: entry.arrived_at_ns,
             content_time_ns: entry.content_time_ns,
         })
+    }
+
+    /// Poses that arrived after a key frame and led a picture, in the order of the file.
+    #[must_use]
+    pub fn late_cameras(&self) -> &[CapturedPose] {
+        &self.index.late_cameras
     }
 
     /// Frames that arrived and were not recorded.

@@ -49,6 +49,12 @@ pub(super) const FRAME: Schema = Schema {
     text: include_str!("schemas/frame.txt"),
     message_encoding: "foreframe",
 };
+pub(super) const LATE_CAMERA: Schema = Schema {
+    name: "foreframe.LateCamera",
+    encoding: "text",
+    text: include_str!("schemas/late_camera.txt"),
+    message_encoding: "foreframe",
+};
 pub(super) const PLANE: Schema = Schema {
     name: "foreframe.Plane",
     encoding: "text",
@@ -63,6 +69,7 @@ pub(super) enum Topic {
     Gap,
     Stream(u32),
     Frame(u32),
+    LateCamera(u32),
     /// Stream, kind, and which one of its kind in the frame, from 0.
     Plane(u32, PlaneKind, u8),
 }
@@ -75,6 +82,7 @@ impl Topic {
             Self::Gap => GAP_TOPIC.to_owned(),
             Self::Stream(stream) => format!("/stream/{stream}/create"),
             Self::Frame(stream) => format!("/stream/{stream}/submit"),
+            Self::LateCamera(stream) => format!("/stream/{stream}/late_camera"),
             Self::Plane(stream, kind, 0) => format!("/stream/{stream}/{}", kind.name()),
             Self::Plane(stream, kind, which) => format!("/stream/{stream}/{}/{which}", kind.name()),
         }
@@ -94,6 +102,7 @@ impl Topic {
         let topic = match (what, parts.next()) {
             ("create", None) => Self::Stream(stream),
             ("submit", None) => Self::Frame(stream),
+            ("late_camera", None) => Self::LateCamera(stream),
             (kind, which) => {
                 Self::Plane(stream, plane_kind(kind)?, which.unwrap_or("0").parse().ok()?)
             }
@@ -107,6 +116,7 @@ impl Topic {
             Self::Gap => &GAP,
             Self::Stream(_) => &STREAM,
             Self::Frame(_) => &FRAME,
+            Self::LateCamera(_) => &LATE_CAMERA,
             Self::Plane(..) => &PLANE,
         }
     }
@@ -122,7 +132,13 @@ mod tests {
 
     #[test]
     fn every_topic_is_found_again_by_its_name() {
-        let mut topics = vec![Topic::Session, Topic::Gap, Topic::Stream(7), Topic::Frame(7)];
+        let mut topics = vec![
+            Topic::Session,
+            Topic::Gap,
+            Topic::Stream(7),
+            Topic::Frame(7),
+            Topic::LateCamera(7),
+        ];
         for &kind in PlaneKind::ALL {
             topics.extend([Topic::Plane(1, kind, 0), Topic::Plane(u32::MAX, kind, 3)]);
         }

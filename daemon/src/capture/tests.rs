@@ -11,6 +11,8 @@ use proptest::prelude::*;
 
 use super::*;
 
+mod late_camera;
+
 const WIDTH: u32 = 6;
 const HEIGHT: u32 = 4;
 const INTERVAL_NS: u64 = 25_000_000;

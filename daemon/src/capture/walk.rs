@@ -8,12 +8,13 @@
 use std::collections::BTreeMap;
 use std::io;
 
-use foreframe_protocol::{PlaneKind, PlaneMap};
+use foreframe_protocol::{Body as _, LateCamera, PlaneKind, PlaneMap};
 use mcap::records::{Record, op};
 
 use super::error::CaptureError;
 use super::index::{
-    Damage, FrameEntry, Index, MAX_SMALL, PlaneStatistics, Span, StreamEntry, record_head, small,
+    CapturedPose, Damage, FrameEntry, Index, MAX_SMALL, PlaneStatistics, Span, StreamEntry,
+    record_head, small,
 };
 use super::record::{self, BadRecord, FrameRecord, MAX_RECORD, PlaneEntry};
 use super::schema::Topic;
@@ -64,6 +65,7 @@ pub(super) struct Walk<'a, S> {
     session: Option<SessionInfo>,
     streams: Vec<StreamEntry>,
     frames: Vec<FrameEntry>,
+    late_cameras: Vec<CapturedPose>,
     gaps: Vec<Gap>,
     planes: PlaneMap<PlaneStatistics>,
     pending: Option<Pending>,
@@ -81,6 +83,7 @@ impl<'a, S: ReadAt> Walk<'a, S> {
             session: None,
             streams: Vec::new(),
             frames: Vec::new(),
+            late_cameras: Vec::new(),
             gaps: Vec::new(),
             planes: PlaneMap::default(),
             pending: None,
@@ -106,6 +109,7 @@ impl<'a, S: ReadAt> Walk<'a, S> {
             session,
             streams: self.streams,
             frames: self.frames,
+            late_cameras: self.late_cameras,
             gaps: self.gaps,
             planes: self.planes,
             size,
@@ -212,7 +216,7 @@ impl<'a, S: ReadAt> Walk<'a, S> {
         while at < end {
             let (opcode, body) = self.next_record(at, end)?;
             match opcode {
-                op::CHANNEL => self.channel(body)?,
+                op::CHANNEL => self.channel(body, &mut chunk)?,
                 op::MESSAGE => self.message(body, &mut chunk)?,
                 _ => {}
             }
@@ -252,15 +256,17 @@ impl<'a, S: ReadAt> Walk<'a, S> {
         Ok(Chunk { records, crc, is_checked: false })
     }
 
-    fn channel(&mut self, body: Span) -> Result<(), Stop> {
+    fn channel(&mut self, body: Span, chunk: &mut Chunk) -> Result<(), Stop> {
         if body.len > MAX_SMALL as u64 {
             return broken(body.at, format!("a channel of at most {MAX_SMALL} bytes"), body.len);
         }
         let bytes = self.window.bytes(body.at, small(body.len))?.unwrap_or_default();
         match mcap::parse_record(op::CHANNEL, bytes) {
             Ok(Record::Channel(channel)) => {
-                self.channels.insert(channel.id, Topic::parse(&channel.topic));
-                Ok(())
+                let topic = Topic::parse(&channel.topic);
+                self.channels.insert(channel.id, topic);
+                // Messages of others are skipped: one bit must not make ours theirs.
+                if topic.is_none() { self.check_crc(chunk) } else { Ok(()) }
             }
             Ok(other) => broken(body.at, "a channel", format!("{other:?}")),
             Err(error) => broken(body.at, "a channel", error),
@@ -288,6 +294,10 @@ impl<'a, S: ReadAt> Walk<'a, S> {
         match topic {
             Topic::Plane(stream, kind, which) => self.plane(data, (stream, kind, which)),
             Topic::Frame(stream) => self.frame(data, stream, sequence, [time(6), time(14)]),
+            Topic::LateCamera(stream) => {
+                self.check_crc(chunk)?;
+                self.late_camera(data, stream, time(6))
+            }
             Topic::Session | Topic::Gap | Topic::Stream(_) => {
                 self.check_crc(chunk)?;
                 self.control(data, topic)
@@ -321,6 +331,25 @@ impl<'a, S: ReadAt> Walk<'a, S> {
                 }
             }
             _ => return broken(data.at, "one such message", format!("a second {topic:?}")),
+        }
+        Ok(())
+    }
+
+    fn late_camera(&mut self, data: Span, stream: u32, arrived_at_ns: u64) -> Result<(), Stop> {
+        if data.len > MAX_RECORD as u64 {
+            return broken(data.at, format!("a pose of at most {MAX_RECORD} bytes"), data.len);
+        }
+        let Some(index) = self.streams.iter().position(|entry| entry.id == stream) else {
+            return broken(data.at, "a stream that was described before", stream);
+        };
+        let bytes = self.window.bytes(data.at, small(data.len))?.unwrap_or_default();
+        let pose = match record::unseal(bytes) {
+            Ok(body) => LateCamera::parse(body),
+            Err(BadRecord { expected, found }) => return broken(data.at, expected, found),
+        };
+        match pose {
+            Ok(pose) => self.late_cameras.push(CapturedPose { stream: index, arrived_at_ns, pose }),
+            Err(error) => return broken(data.at, "a late-camera body", error),
         }
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! Writing a capture: streams, frames and gaps, as they happen.
+//! Writing a capture: streams, frames, late cameras and gaps, as they happen.
 //!
 //! The writer does its work on the caller's thread and spawns none, so that a recorder can put it
 //! behind a queue and the cores stay with the engine. After each call everything handed over is in
@@ -10,7 +10,8 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use foreframe_protocol::{
-    Body as _, CreateStream, PlaneDescriptor, PlaneKind, PlaneSize, StreamFormat, Submit,
+    Body as _, CreateStream, LateCamera, PlaneDescriptor, PlaneKind, PlaneSize, StreamFormat,
+    Submit,
 };
 
 use super::codec::Coding;
@@ -33,6 +34,7 @@ struct OpenStream {
     id: u32,
     format: StreamFormat,
     frames: u32,
+    poses: u32,
 }
 
 impl CaptureWriter {
@@ -75,7 +77,7 @@ impl<W: Write> CaptureWriter<W> {
             return Err(unrecordable("a stream", bad));
         }
         self.container.stream(id, &create.to_bytes())?;
-        self.streams.push(OpenStream { id, format: create.format, frames: 0 });
+        self.streams.push(OpenStream { id, format: create.format, frames: 0, poses: 0 });
         Ok(())
     }
 
@@ -105,6 +107,28 @@ impl<W: Write> CaptureWriter<W> {
         };
         stream.frames = stream.frames.wrapping_add(1);
         self.container.frame(stream.id, stamp, &submit.to_bytes(), planes, self.coding)
+    }
+
+    /// Records a pose that arrived after a key frame.
+    ///
+    /// # Errors
+    /// If its stream was not added, or the file cannot be written.
+    pub fn late_camera(
+        &mut self,
+        arrived_at_ns: u64,
+        pose: &LateCamera,
+    ) -> Result<(), CaptureError> {
+        let Some(stream) = self.streams.iter_mut().find(|stream| stream.id == pose.stream) else {
+            let bad = BadRecord::new("a pose of a stream that was added", pose.stream);
+            return Err(unrecordable("a late camera", bad));
+        };
+        let stamp = Stamp {
+            log_time: arrived_at_ns,
+            publish_time: pose.content_time_ns,
+            sequence: stream.poses,
+        };
+        stream.poses = stream.poses.wrapping_add(1);
+        self.container.late_camera(stream.id, stamp, &pose.to_bytes())
     }
 
     /// Records that frames are missing.

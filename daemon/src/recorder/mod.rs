@@ -18,7 +18,7 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use foreframe_engine::MonoTime;
-use foreframe_protocol::{CreateStream, PlaneKind, StreamFormat, Submit};
+use foreframe_protocol::{CreateStream, LateCamera, PlaneKind, StreamFormat, Submit};
 use rustix::fs::{Mode, OFlags, fcntl_getfl, fcntl_setfl, open};
 use tracing::warn;
 
@@ -27,6 +27,8 @@ use crate::capture::{
 };
 use crate::stream::planes::KeyPlanes;
 
+/// Late cameras that wait for the next key; of more, the oldest are left out.
+const HELD_POSES: usize = 256;
 /// Keys that may wait for the disk, over all streams. At 60 keys a second this rides out a stall of
 /// 130 ms; each costs one set of planes of memory.
 const QUEUED_KEYS: usize = 8;
@@ -35,14 +37,22 @@ const QUEUED_KEYS: usize = 8;
 enum Job {
     Stream(CreateStream),
     Key {
-        gap: Option<Gap>,
+        before: Unsaid,
         arrived_at: MonoTime,
         submit: Submit,
         planes: Arc<KeyPlanes>,
     },
-    Gap(Gap),
+    Unsaid(Unsaid),
     /// Wakes the thread, which then sees that the recording is over.
     End,
+}
+
+/// What is to be recorded before the next key, or at the end of the stream.
+#[derive(Clone, Default, Debug)]
+struct Unsaid {
+    gap: Option<Gap>,
+    /// Of the number that the stream has in the file, and when each arrived.
+    poses: Vec<(LateCamera, MonoTime)>,
 }
 
 /// The recording of one daemon.
@@ -73,7 +83,7 @@ pub struct StreamRecorder {
     number: u32,
     /// There until it is in the queue.
     unannounced: Option<CreateStream>,
-    gap: Option<Gap>,
+    unsaid: Unsaid,
 }
 
 impl std::fmt::Debug for Shared {
@@ -118,7 +128,7 @@ impl Recorder {
     #[must_use]
     pub fn stream(&self, number: u32) -> StreamRecorder {
         let (jobs, shared) = (self.jobs.clone(), Arc::clone(&self.shared));
-        StreamRecorder { jobs, shared, number, unannounced: None, gap: None }
+        StreamRecorder { jobs, shared, number, unannounced: None, unsaid: Unsaid::default() }
     }
 }
 
@@ -151,14 +161,26 @@ impl StreamRecorder {
         }
         let submit = Submit { stream: self.number, ..*submit };
         let planes = Arc::clone(planes);
-        let job = Job::Key { gap: self.gap.take(), arrived_at, submit, planes };
+        let before = std::mem::take(&mut self.unsaid);
+        let job = Job::Key { before, arrived_at, submit, planes };
         let Err(TrySendError::Full(job) | TrySendError::Disconnected(job)) =
             self.jobs.try_send(job)
         else {
             return;
         };
-        self.gap = if let Job::Key { gap, .. } = job { gap } else { None };
+        if let Job::Key { before, .. } = job {
+            self.unsaid = before;
+        }
         self.count_missing(arrived_at);
+    }
+
+    /// Hands over a pose that leads pictures from now on. It is recorded with the next key.
+    pub fn offer_late_camera(&mut self, pose: &LateCamera, arrived_at: MonoTime) {
+        let poses = &mut self.unsaid.poses;
+        if poses.len() == HELD_POSES {
+            poses.remove(0);
+        }
+        poses.push((LateCamera { stream: self.number, ..*pose }, arrived_at));
     }
 
     /// True once the stream is announced.
@@ -173,7 +195,7 @@ impl StreamRecorder {
 
     fn count_missing(&mut self, arrived_at: MonoTime) {
         let at_ns = arrived_at.as_ns();
-        let gap = self.gap.get_or_insert_with(|| Gap {
+        let gap = self.unsaid.gap.get_or_insert_with(|| Gap {
             stream: self.number,
             count: 0,
             from_ns: at_ns,
@@ -186,12 +208,15 @@ impl StreamRecorder {
 }
 
 impl Drop for StreamRecorder {
-    /// Records a gap at the end of the stream.
+    /// Records at the end of the stream what no key followed.
     fn drop(&mut self) {
-        let Some(gap) = self.gap.take() else { return };
+        let unsaid = std::mem::take(&mut self.unsaid);
+        if unsaid.gap.is_none() && unsaid.poses.is_empty() {
+            return;
+        }
         let announcement = self.unannounced.take().map(Job::Stream);
         let mut last_words = self.shared.lock();
-        last_words.extend(announcement.into_iter().chain([Job::Gap(gap)]));
+        last_words.extend(announcement.into_iter().chain([Job::Unsaid(unsaid)]));
         drop(last_words);
         // With the queue full the thread is awake and looks after each job.
         let _full = self.jobs.try_send(Job::End);
@@ -256,12 +281,10 @@ fn record<W: io::Write>(
             formats.push((create.stream, create.format));
             writer.add_stream(&create)
         }
-        Job::Gap(gap) => writer.gap(&gap),
+        Job::Unsaid(unsaid) => record_unsaid(writer, &unsaid),
         Job::End => Ok(()),
-        Job::Key { gap, arrived_at, submit, planes } => {
-            if let Some(gap) = gap {
-                writer.gap(&gap)?;
-            }
+        Job::Key { before, arrived_at, submit, planes } => {
+            record_unsaid(writer, &before)?;
             let format = formats.iter().find(|(number, _)| *number == submit.stream);
             let (_, format) = format.expect("a stream is announced before its keys");
             let infos = PlaneKind::ALL.iter().filter_map(|&kind| plane(format, &submit, kind));
@@ -271,6 +294,19 @@ fn record<W: io::Write>(
             writer.write_frame(arrived_at.as_ns(), &submit, &planes).map(|_| ())
         }
     }
+}
+
+fn record_unsaid<W: io::Write>(
+    writer: &mut CaptureWriter<W>,
+    unsaid: &Unsaid,
+) -> Result<(), CaptureError> {
+    if let Some(gap) = &unsaid.gap {
+        writer.gap(gap)?;
+    }
+    unsaid
+        .poses
+        .iter()
+        .try_for_each(|(pose, arrived_at)| writer.late_camera(arrived_at.as_ns(), pose))
 }
 
 fn plane(format: &StreamFormat, submit: &Submit, kind: PlaneKind) -> Option<PlaneInfo> {

@@ -55,7 +55,7 @@ impl Server {
                 self.submit(id, submit, now).map_err(|it| it.of_stream(submit.stream))
             }
             ClientMessage::LateCamera(camera) => {
-                self.stream_of(id, camera.stream)?.mailbox.put_late_camera(camera);
+                self.stream_of(id, camera.stream)?.mailbox.put_late_camera(camera, now);
                 Ok(())
             }
             ClientMessage::Subscribe(subscribe) => self.subscribe(id, subscribe),

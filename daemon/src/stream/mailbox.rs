@@ -67,8 +67,8 @@ struct State {
     slots: SlotTable,
     /// There whenever a slot is submitted.
     waiting: Option<Submission>,
-    /// The pose of the newest content time that was not taken out yet.
-    late_camera: Option<LateCamera>,
+    /// The pose of the newest content time that was not taken out yet, and when it came in.
+    late_camera: Option<(LateCamera, MonoTime)>,
     counts: KeyCounts,
     outlets: Outlets,
     is_closed: bool,
@@ -137,17 +137,17 @@ impl Mailbox {
 
     /// Puts a late camera in; of two the newer content time stays. Nobody is woken: the next picture
     /// looks, and a stream that has none planned waits for its next key.
-    pub fn put_late_camera(&self, pose: LateCamera) {
+    pub fn put_late_camera(&self, pose: LateCamera, arrived_at: MonoTime) {
         let mut state = self.lock();
         let is_newer =
-            state.late_camera.is_none_or(|held| pose.content_time_ns > held.content_time_ns);
+            state.late_camera.is_none_or(|(held, _)| pose.content_time_ns > held.content_time_ns);
         if is_newer {
-            state.late_camera = Some(pose);
+            state.late_camera = Some((pose, arrived_at));
         }
     }
 
-    /// Takes the late camera out.
-    pub fn take_late_camera(&self) -> Option<LateCamera> {
+    /// Takes the late camera out, with the time when it came in.
+    pub fn take_late_camera(&self) -> Option<(LateCamera, MonoTime)> {
         self.lock().late_camera.take()
     }
 

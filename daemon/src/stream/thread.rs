@@ -248,7 +248,10 @@ impl StreamThread {
 
     fn make_frame(&mut self, plan: &Plan) {
         self.owes_picture = false;
-        if let Some(pose) = self.parts.mailbox.take_late_camera() {
+        if let Some((pose, arrived_at)) = self.parts.mailbox.take_late_camera() {
+            if let Some(recorder) = &mut self.parts.recorder {
+                recorder.offer_late_camera(&pose, arrived_at);
+            }
             self.core.late_camera(MonoTime::from_ns(pose.content_time_ns), pose.view);
         }
         let outcome = self.core.make(plan, clock::now);

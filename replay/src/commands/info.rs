@@ -32,6 +32,7 @@ struct Report {
     truncated: bool,
     planes: Vec<&'static str>,
     camera: bool,
+    late_cameras: usize,
     name: String,
     source: foreframed::capture::CaptureSource,
     software: String,
@@ -102,6 +103,7 @@ impl Report {
             truncated: info.is_truncated(),
             planes: info.planes.iter().map(|planes| planes.kind.name()).collect(),
             camera: info.camera,
+            late_cameras: info.streams.iter().map(|stream| stream.late_cameras).sum(),
             name: info.session.name.clone(),
             source: info.session.source,
             software: info.session.software.clone(),
@@ -174,7 +176,12 @@ fn text(report: &Report) -> String {
             format!("{} planes, {stored:.1} MB, {ratio:.1}:1, {codecs}", planes.count),
         );
     }
-    line("camera", if report.camera { "yes" } else { "no" }.to_owned());
+    let camera = match (report.camera, report.late_cameras) {
+        (false, _) => "no".to_owned(),
+        (true, 0) => "yes".to_owned(),
+        (true, poses) => format!("yes, and {poses} late poses"),
+    };
+    line("camera", camera);
     for stream in &report.streams {
         let depth = stream.depth.as_deref().unwrap_or("none");
         let motion = stream.motion.as_deref().unwrap_or("none");

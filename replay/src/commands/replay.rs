@@ -20,7 +20,7 @@ use crate::recording::capture::CaptureRecording;
 use crate::recording::keys::KeyReader;
 use crate::recording::plan::Plan;
 use crate::virtual_time::digest::FrameDigester;
-use crate::virtual_time::keys::{KeyTiming, timed_keys};
+use crate::virtual_time::keys::{KeyTiming, timed_keys, timed_poses};
 use crate::virtual_time::{OutputFrame, OutputKind, ReplayConfig, replay};
 
 /// Arguments of `foreframe replay`.
@@ -112,6 +112,7 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
     let plan = Plan::new(recording.heads(), args.ratio);
     let reader = KeyReader::new(recording.format(), &plan)?;
     let refresh_interval = MonoSpan::from_hz(args.refresh);
+    let timing = if args.step { KeyTiming::Stepped } else { KeyTiming::AsRecorded };
     let config = ReplayConfig {
         method: args.method,
         gpu: gpu::open(&args.backend).context("--backend")?,
@@ -123,8 +124,8 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
             Some(ppd) => Some(ppd as f32),
             None => recording.pixels_per_degree()?,
         },
+        late_cameras: timed_poses(&recording.late_cameras(), recording.heads(), &plan, timing),
     };
-    let timing = if args.step { KeyTiming::Stepped } else { KeyTiming::AsRecorded };
     let mut sink = Sink::open(&args.sink, reader.format(), refresh_interval, 0)
         .with_context(|| format!("--sink {}", args.sink))?;
 

@@ -15,6 +15,7 @@ use foreframed::capture::{
 use foreframed::ingest::{self, PlaneSource};
 
 use super::{Frame, FrameHead, OwnedPlane, Recording, Wanted};
+use crate::virtual_time::TimedPose;
 
 /// What a user should know about a file that is not whole: one line each.
 #[must_use]
@@ -125,6 +126,19 @@ impl<S: ReadAt> CaptureRecording<S> {
             format!("{DISPLAY_ORIGIN} of the session: expected 0 to {first}, found `{text}`")
         })?;
         Ok(Some(origin))
+    }
+
+    /// Poses that arrived after their keys and led pictures of the daemon that recorded.
+    #[must_use]
+    pub fn late_cameras(&self) -> Vec<TimedPose> {
+        let of_stream = self.capture.late_cameras().iter().filter(|it| it.stream == self.stream);
+        of_stream
+            .map(|captured| TimedPose {
+                arrives_at: MonoTime::from_ns(captured.arrived_at_ns),
+                content_time: MonoTime::from_ns(captured.pose.content_time_ns),
+                view: captured.pose.view,
+            })
+            .collect()
     }
 
     /// What a user should know about the file before trusting a result: one line each.

@@ -1,8 +1,8 @@
-//! When the keys of a recording arrive on the virtual clock.
+//! When the keys and the late cameras of a recording arrive on the virtual clock.
 
 use foreframe_engine::MonoTime;
 
-use super::TimedKey;
+use super::{TimedKey, TimedPose};
 use crate::recording::keys::KeyReader;
 use crate::recording::plan::Plan;
 use crate::recording::{FrameHead, Recording};
@@ -47,6 +47,30 @@ pub fn timed_keys<'a>(
     })
 }
 
+/// The poses of `recorded`, in order of arrival, as far from the key before them as they were when
+/// they were recorded. Poses that arrived before the first key lead nothing and are left out.
+#[must_use]
+pub fn timed_poses(
+    recorded: &[TimedPose],
+    heads: &[FrameHead],
+    plan: &Plan,
+    timing: KeyTiming,
+) -> Vec<TimedPose> {
+    let arrivals = arrivals(heads, plan, timing);
+    let keys = || plan.keys.iter().map(|key| &heads[key.frame]).zip(&arrivals);
+    let mut poses: Vec<_> = recorded
+        .iter()
+        .filter_map(|pose| {
+            let (key, &key_arrives_at) =
+                keys().take_while(|(key, _)| key.arrived_at <= pose.arrives_at).last()?;
+            let arrives_at = key_arrives_at + (pose.arrives_at - key.arrived_at);
+            Some(TimedPose { arrives_at, ..*pose })
+        })
+        .collect();
+    poses.sort_by_key(|pose| pose.arrives_at);
+    poses
+}
+
 #[cfg(test)]
 mod tests {
     use std::num::NonZeroUsize;
@@ -78,6 +102,23 @@ mod tests {
         assert_eq!(recorded, [100, 131, 149].map(at_ms));
         let stepped = arrivals(&heads, &plan, KeyTiming::Stepped);
         assert_eq!(stepped, [100, 125, 150].map(at_ms));
+    }
+
+    #[test]
+    fn a_pose_stays_as_far_behind_its_key_as_it_was_recorded() {
+        let (heads, plan) = plan_of(&[(0, 100), (25, 131), (50, 149)]);
+        let pose = |arrives_ms| TimedPose {
+            arrives_at: at_ms(arrives_ms),
+            content_time: at_ms(0),
+            view: [0.0; 16],
+        };
+        let recorded = [99, 104, 131, 160].map(pose);
+        let arrivals = |timing| {
+            let poses = timed_poses(&recorded, &heads, &plan, timing);
+            poses.iter().map(|pose| pose.arrives_at).collect::<Vec<_>>()
+        };
+        assert_eq!(arrivals(KeyTiming::AsRecorded), [104, 131, 160].map(at_ms));
+        assert_eq!(arrivals(KeyTiming::Stepped), [104, 125, 161].map(at_ms));
     }
 
     #[test]

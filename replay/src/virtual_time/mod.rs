@@ -34,6 +34,8 @@ pub struct ReplayConfig {
     pub display_origin: Option<MonoTime>,
     /// Angular size of a pixel, which turns on damping of motion that no eye can follow.
     pub pixels_per_degree: Option<f32>,
+    /// Poses that arrive after their keys, in the order of their arrival.
+    pub late_cameras: Vec<TimedPose>,
 }
 
 /// Where an output frame comes from.
@@ -87,6 +89,17 @@ pub struct TimedKey {
     pub frame: Frame,
 }
 
+/// A pose of the camera and when it arrives.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct TimedPose {
+    /// On the virtual clock.
+    pub arrives_at: MonoTime,
+    /// Content time of the pose.
+    pub content_time: MonoTime,
+    /// World to view, column-major.
+    pub view: [f32; 16],
+}
+
 /// Replays `keys` and hands each output frame to `show`. Ends one key interval after the last key,
 /// and not before a picture was shown.
 ///
@@ -105,6 +118,7 @@ pub fn replay(
     let mut stream = VirtualStream::new(format, config, clock);
     let mut next = Some(first);
     let mut last_arrivals = [clock; 2];
+    let mut poses = &config.late_cameras[..];
     loop {
         let plan = stream.core.plan(clock);
         let is_taken = |key: &mut TimedKey| {
@@ -132,6 +146,12 @@ pub fn replay(
         if plan.content_time.is_none() || (is_over && stream.shown.is_some()) {
             losses.fell_back = stream.core.backend().fell_back.clone();
             return Ok(losses);
+        }
+        while let Some((pose, later)) =
+            poses.split_first().filter(|(pose, _)| pose.arrives_at <= plan.wake_at)
+        {
+            stream.core.late_camera(pose.content_time, pose.view);
+            poses = later;
         }
         clock = plan.wake_at + stream.work;
         stream.owes_picture = false;

@@ -10,6 +10,8 @@ use crate::recording::keys::KeyReader;
 use crate::recording::memory::MemoryRecording;
 use crate::recording::plan::Plan;
 
+mod late_camera;
+
 /// What a replay showed.
 #[derive(PartialEq, Debug)]
 struct Shown {
@@ -53,6 +55,7 @@ fn replayed_plan(
         refresh_interval: MonoSpan::from_hz(refresh_hz),
         display_origin: None,
         pixels_per_degree: None,
+        late_cameras: Vec::new(),
     };
     let mut digester = FrameDigester::default();
     let mut frames = Vec::new();
@@ -200,6 +203,7 @@ fn refreshes_lie_where_the_recording_says() {
             refresh_interval,
             display_origin,
             pixels_per_degree: None,
+            late_cameras: Vec::new(),
         };
         let keys = timed_keys(&mut recording, &reader, &plan, KeyTiming::AsRecorded);
         let mut shown = 0;
@@ -226,6 +230,7 @@ fn an_error_of_the_sink_ends_the_replay() {
         refresh_interval: MonoSpan::from_hz(60.0),
         display_origin: None,
         pixels_per_degree: None,
+        late_cameras: Vec::new(),
     };
     let keys = timed_keys(&mut recording, &reader, &plan, KeyTiming::Stepped);
     let result = replay(*reader.format(), &config, keys, |_, _| anyhow::bail!("disk full"));
@@ -255,6 +260,7 @@ fn what_is_repeated_is_the_picture_that_was_shown_and_not_one_that_was_dropped()
         refresh_interval: MonoSpan::from_hz(100.0),
         display_origin: None,
         pixels_per_degree: None,
+        late_cameras: Vec::new(),
     };
     let keys = timed_keys(&mut recording, &reader, &plan, KeyTiming::Stepped);
     let keys: Vec<_> = keys.map(Result::unwrap).take(2).collect();
