@@ -1,7 +1,7 @@
 //! Prints milliseconds per key and per in-between frame, by method and size.
 //!
 //! Usage: `cargo run --release -p foreframe-engine --example time_methods
-//! [-- THREADS [METHOD|all [cpu|gpu:NAME]]]`
+//! [-- THREADS [METHOD,..|all [cpu|gpu:NAME]]]`
 //!
 //! Colour rgba8, depth f32 and motion rg16f at half resolution. The scene is a slanted ground that
 //! the camera moves over and a grid of nearer tiles that move across it: everything moves by
@@ -154,7 +154,7 @@ fn main() {
     for (width, height) in [(1280, 720), (1920, 1080)] {
         let cases = Method::ALL.map(|method| (method, false));
         for (method, still) in cases.into_iter().chain([(Method::Linear, true)]) {
-            if only.as_ref().is_some_and(|only| only != method.name()) {
+            if only.as_ref().is_some_and(|only| only.split(',').all(|one| one != method.name())) {
                 continue;
             }
             let [key, frame] = time(width, height, method, threads, still, gpu.as_ref());

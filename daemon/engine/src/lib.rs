@@ -23,6 +23,7 @@ pub mod fill;
 pub mod format;
 pub mod kernels;
 pub mod key;
+mod lanes;
 pub mod method;
 pub mod pacing;
 pub mod params;

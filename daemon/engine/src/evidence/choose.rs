@@ -2,7 +2,7 @@
 
 use rayon::ThreadPool;
 
-use super::{PerRung, RUNGS, Sample, index_of};
+use super::{Lead, MIXED, PerRung, RUNGS, Sample, index_of};
 use crate::bands::for_each_row;
 use crate::plane::Plane;
 use crate::trajectory::camera_path::CameraOrder;
@@ -33,8 +33,10 @@ pub(super) fn choose(
     pool: &ThreadPool,
     order: CameraOrder,
     image: Rung,
-    samples: &mut Plane<Sample>,
+    samples: &Plane<Sample>,
+    leads: &mut Plane<Lead>,
 ) -> Rung {
+    leads.resize(samples.width(), samples.height());
     let (mut sum, mut count) = (PerRung::default(), 0.0);
     for sample in samples.data().iter().filter(|sample| sample.keys > 0) {
         for (sum, mean) in sum.iter_mut().zip(sample.mean) {
@@ -43,39 +45,82 @@ pub(super) fn choose(
         count += 1.0;
     }
     if count == 0.0 {
-        samples.data_mut().iter_mut().for_each(|sample| sample.rung = image);
+        leads.data_mut().fill(Lead { rung: image });
         return image;
     }
     let mean = sum.map(|sum| sum / count);
     let tolerated = |rung| Preferred { rung, slack: None };
     let image = cheapest(&mean, order, &[tolerated(image)]);
-    let known = samples.clone();
-    for_each_row(pool, samples, |row, samples| {
-        for (column, sample) in (0..).zip(samples) {
-            let whole = |count: f32| Preferred { rung: image, slack: Some(DOUBT / count) };
-            sample.rung = match score(&known, column, row) {
-                Some((score, count)) if sample.keys > 1 => {
-                    cheapest(&score, order, &[tolerated(sample.rung), whole(count)])
+    for_each_row(
+        pool,
+        leads,
+        #[inline(always)]
+        |row, leads| {
+            let own = samples.row(row);
+            for (column, (lead, sample)) in (0..).zip(leads.iter_mut().zip(own)) {
+                if is_settled(sample) {
+                    *lead = sample.lead;
+                    continue;
                 }
-                Some((score, count)) => cheapest(&score, order, &[whole(count)]),
-                None => image,
-            };
-        }
-    });
+                let whole = |count: f32| Preferred { rung: image, slack: Some(DOUBT / count) };
+                lead.rung = match score(samples, column, row) {
+                    Some((score, count)) if sample.keys > 1 => {
+                        cheapest(&score, order, &[tolerated(sample.lead.rung), whole(count)])
+                    }
+                    Some((score, count)) => cheapest(&score, order, &[whole(count)]),
+                    None => image,
+                };
+            }
+        },
+    );
     image
 }
 
+/// Whether the rung of a sample goes without saying: [`Rung::Linear`] or [`Rung::Hold`], which has
+/// met some keys to a tenth of a pixel, while the cheaper ones have not met them at all.
+#[inline(always)]
+fn is_settled(sample: &Sample) -> bool {
+    let index = index_of(sample.lead.rung);
+    let cheaper = &sample.mean[..index.min(index_of(Rung::Linear))];
+    sample.keys > 1
+        && index <= index_of(Rung::Linear)
+        && sample.mean[index] <= TOLERANCE
+        && cheaper.iter().all(|mean| *mean > CLEARLY)
+}
+
+/// Marks for every sample whether those around it take its rung.
+pub(super) fn share(pool: &ThreadPool, leads: &Plane<Lead>, shared: &mut Plane<u8>) {
+    let [width, height] = [leads.width(), leads.height()];
+    shared.resize(width, height);
+    for_each_row(
+        pool,
+        shared,
+        #[inline(always)]
+        |row, shared| {
+            let rows = [row.saturating_sub(1), row, (row + 1).min(height - 1)];
+            let rows = rows.map(|row| leads.row(row));
+            for (column, shared) in shared.iter_mut().enumerate() {
+                let own = rows[1][column];
+                let columns = column.saturating_sub(1)..(column + 2).min(width as usize);
+                let is_shared =
+                    rows.iter().all(|row| row[columns.clone()].iter().all(|lead| *lead == own));
+                *shared = if is_shared { index_of(own.rung) as u8 } else { MIXED };
+            }
+        },
+    );
+}
+
 /// (4) at one sample, and of how many; None where nothing is known of the surface.
+#[inline(always)]
 fn score(samples: &Plane<Sample>, column: u32, row: u32) -> Option<(PerRung, f32)> {
-    let depth = samples.at(column, row).depth;
+    let depth = samples.row(row)[column as usize].depth;
     let (mut sum, mut count) = (PerRung::default(), 0.0);
     let last = [samples.width() - 1, samples.height() - 1];
+    let columns = column.saturating_sub(REACH) as usize..=(column + REACH).min(last[0]) as usize;
     for row in row.saturating_sub(REACH)..=(row + REACH).min(last[1]) {
-        let columns = column.saturating_sub(REACH)..=(column + REACH).min(last[0]);
-        for column in columns {
-            let sample = samples.at(column, row);
+        for sample in &samples.row(row)[columns.clone()] {
             if sample.keys > 0 && is_same_surface(sample.depth, depth) {
-                for (sum, mean) in sum.iter_mut().zip(sample.mean) {
+                for (sum, mean) in sum.iter_mut().zip(&sample.mean) {
                     *sum += mean;
                 }
                 count += 1.0;
@@ -94,6 +139,7 @@ struct Preferred {
 
 /// The first of `preferred` that is good enough, unless a cheaper one is as good as the best; else the
 /// cheapest rung within the tolerance of the best.
+#[inline(always)]
 fn cheapest(score: &PerRung, order: CameraOrder, preferred: &[Preferred]) -> Rung {
     let linear = index_of(Rung::Linear);
     let is_open = |rung: Rung| match (rung, index_of(rung)) {
@@ -186,11 +232,12 @@ mod tests {
             })
         };
         let pool = crate::testing::pool(2);
-        let mut lone = samples(|x, y| (x, y) == (10, 10));
-        assert_eq!(choose(&pool, ORDER, Rung::Hold, &mut lone), Rung::Linear);
-        assert_eq!(lone.at(10, 10).rung, Rung::Linear);
-        let mut patch = samples(|x, y| x < 8 && y < 8);
-        choose(&pool, ORDER, Rung::Hold, &mut patch);
-        assert_eq!((patch.at(3, 3).rung, patch.at(15, 15).rung), (Rung::Affine, Rung::Linear));
+        let mut leads = Plane::default();
+        let lone = samples(|x, y| (x, y) == (10, 10));
+        assert_eq!(choose(&pool, ORDER, Rung::Hold, &lone, &mut leads), Rung::Linear);
+        assert_eq!(leads.at(10, 10).rung, Rung::Linear);
+        let patch = samples(|x, y| x < 8 && y < 8);
+        choose(&pool, ORDER, Rung::Hold, &patch, &mut leads);
+        assert_eq!((leads.at(3, 3).rung, leads.at(15, 15).rung), (Rung::Affine, Rung::Linear));
     }
 }

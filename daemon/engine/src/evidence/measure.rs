@@ -1,14 +1,22 @@
 //! (1) to (3) of [`super`].
+//!
+//! Every sample is followed back and asked for the rung in use and those that cost nothing, `hold`
+//! and `linear`. Where the rung in use has failed, and in a part of the samples that moves on from
+//! key to key, the whole ladder is measured, in a second pass: what its rungs need of the older key
+//! is worked out in between, and only there.
 
 use rayon::ThreadPool;
 
-use super::{PerRung, RUNGS, STRIDE, Sample};
-use crate::bands::for_each_row;
+use super::{Lead, PerRung, RUNGS, STRIDE, Sample, index_of};
+use crate::bands::for_each_row_of_two;
 use crate::key::KeyFrame;
+use crate::lanes::LANES;
 use crate::plane::Plane;
-use crate::trajectory::grid::Grid;
+use crate::trajectory::camera_path::CameraOrder;
 use crate::trajectory::ladder::Models;
+use crate::trajectory::lattice::Lattice;
 use crate::trajectory::quadratic::Quadratic;
+use crate::trajectory::rung::Rung;
 use crate::trajectory::surface::{Around, is_same_surface};
 
 /// c of (2), pixels at the next key: an in-between frame in the middle has half of the error or less,
@@ -16,89 +24,266 @@ use crate::trajectory::surface::{Around, is_same_surface};
 const CONTRAST_PX: f32 = 2.0;
 /// Keys that (3) averages over.
 const KEYS: u8 = 4;
+/// A rung with a larger (2) than this has failed: a fifth of a pixel.
+const FAILED: f32 = 0.01;
+
+const HOLD: usize = 0;
+const LINEAR: usize = 2;
+/// The first of the camera's orders.
+pub(super) const WORLD: usize = RUNGS.len() - CameraOrder::ALL.len();
 
 /// What the rungs said of the key before.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub struct Predictions<'a> {
     /// That key.
     pub key: &'a KeyFrame,
-    /// What its rungs need.
-    pub models: &'a Models,
+    /// What its rungs need; more of it is worked out where it is missing.
+    pub models: &'a mut Models,
     /// How it read the key before it.
     pub older: Option<&'a Quadratic<'a>>,
     /// Phase of the new key after it.
     pub phase: f32,
 }
 
-/// Makes the samples of `key` from `predictions` and the samples `before`, those of the key that the
-/// predictions were made for. Rungs are left as they were on the surface.
-pub(super) fn measure(
-    pool: &ThreadPool,
-    key: &KeyFrame,
-    grid: &Grid,
-    predictions: Option<&Predictions<'_>>,
-    before: &Plane<Sample>,
-    is_still: impl Fn(u32, u32) -> bool + Sync,
-    samples: &mut Plane<Sample>,
-) {
-    let [columns, rows] = grid.cells.map(|cells| cells.div_ceil(STRIDE));
-    samples.resize(columns, rows);
-    for_each_row(pool, samples, |row, samples| {
-        let y = (row * STRIDE + STRIDE / 2).min(grid.cells[1] - 1);
-        for (column, sample) in (0..).zip(samples) {
-            let x = (column * STRIDE + STRIDE / 2).min(grid.cells[0] - 1);
-            let depth = if key.depth.data().is_empty() { 0 } else { key.depth.at(x, y) };
-            *sample = Sample { depth, is_still: is_still(x, y), ..Sample::default() };
-            if let Some(predictions) = predictions {
-                measure_one(key, grid, predictions, before, [x, y], sample);
+/// Where a sample was in the key before.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub(super) struct Trace {
+    /// The cell of its surface.
+    cell: [u16; 2],
+    is_known: bool,
+    /// Whether the whole ladder is to be measured.
+    needs_all: bool,
+}
+
+/// Errors of the camera's orders over samples that move with the world, and their number.
+pub(super) type OrderSums = [f32; CameraOrder::ALL.len() + 1];
+
+/// What is measured beside the new key itself.
+pub(super) struct Measuring<'a> {
+    pub(super) lattice: &'a Lattice,
+    /// The samples of the key that the predictions were made for.
+    pub(super) before: &'a Plane<Sample>,
+    /// The rung of what has no history.
+    pub(super) image_rung: Rung,
+    /// Which samples are measured by the whole ladder: every so many runs of eight, and which of them.
+    pub(super) turn: [u32; 2],
+    /// Whether nothing but the camera's order is asked for.
+    pub(super) orders_alone: bool,
+}
+
+impl Measuring<'_> {
+    /// Makes the samples of the new key where nothing was predicted of it.
+    pub(super) fn begin(&self, pool: &ThreadPool, samples: &mut Plane<Sample>) {
+        let [columns, rows] = self.lattice.points();
+        samples.resize(columns, rows);
+        crate::bands::for_each_row(pool, samples, |row, samples| {
+            for (column, sample) in (0..).zip(samples) {
+                let (_, depth) = self.lattice.at(column, row);
+                *sample = Sample { depth, ..Sample::default() };
+            }
+        });
+    }
+
+    /// Makes the samples of the new key and returns what the still ones among those measured by the
+    /// whole ladder show of the camera's orders. Rungs are left as they were on the surface.
+    pub(super) fn measure(
+        &self,
+        pool: &ThreadPool,
+        predictions: &mut Predictions<'_>,
+        is_still: impl Fn(u32, u32) -> bool + Sync,
+        traces: &mut Plane<Trace>,
+        samples: &mut Plane<Sample>,
+    ) -> OrderSums {
+        let [columns, rows] = self.lattice.points();
+        samples.resize(columns, rows);
+        traces.resize(columns, rows);
+        let known = &*predictions;
+        for_each_row_of_two(
+            pool,
+            samples,
+            traces,
+            #[inline(always)]
+            |row, samples, traces| {
+                for (column, (sample, trace)) in (0..).zip(samples.iter_mut().zip(traces)) {
+                    (*sample, *trace) = self.follow(known, column, row);
+                }
+            },
+        );
+        fit_affine(pool, predictions, traces);
+        let known = &*predictions;
+        let mut sums = Plane::new(1, rows);
+        for_each_row_of_two(pool, samples, &mut sums, |row, samples, sums: &mut [OrderSums]| {
+            let traces = traces.row(row);
+            for (column, (sample, trace)) in (0..).zip(samples.iter_mut().zip(traces)) {
+                if !trace.needs_all {
+                    continue;
+                }
+                let (d, _) = self.lattice.at(column, row);
+                let now = all_errors(known, trace.cell, d);
+                self.take_in(sample, trace.cell, &now, |_| true);
+                if is_still(column, row) {
+                    for (sum, error) in sums[0].iter_mut().zip(&now[WORLD..]) {
+                        *sum += error;
+                    }
+                    sums[0][CameraOrder::ALL.len()] += 1.0;
+                }
+            }
+        });
+        let mut total = OrderSums::default();
+        for sums in sums.data() {
+            for (total, sum) in total.iter_mut().zip(sums) {
+                *total += sum;
             }
         }
-    });
+        total
+    }
+
+    /// Follows one sample back, and measures what costs little.
+    #[inline(always)]
+    fn follow(&self, predictions: &Predictions<'_>, column: u32, row: u32) -> (Sample, Trace) {
+        let (d, depth) = self.lattice.at(column, row);
+        let mut sample = Sample { depth, ..Sample::default() };
+        let mut trace = Trace::default();
+        let at = self.lattice.place(column, row);
+        let has_depth = !predictions.key.depth.data().is_empty();
+        let was = [at[0] - d[0], at[1] - d[1]];
+        let Some([x, y]) = cell_at(predictions, was, has_depth.then_some(depth)) else {
+            return (sample, trace);
+        };
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "grids have at most 8192 cells per axis"
+        )]
+        let cell = [x as u16, y as u16];
+        (trace.cell, trace.is_known) = (cell, true);
+        let is_its_turn = (column / LANES as u32 + TURN_STEP * row) % self.turn[0] == self.turn[1];
+        if self.orders_alone {
+            trace.needs_all = is_its_turn;
+            return (sample, trace);
+        }
+        let history = self.history(cell, depth);
+        let used = history.map_or(self.image_rung, |history| history.lead.rung);
+        let mut now = PerRung::default();
+        let straight = straight(predictions, x, y);
+        now[HOLD] = error([0.0; 2], d);
+        now[LINEAR] = error(straight, d);
+        let used_index = index_of(used);
+        let foreseen = match used {
+            Rung::Hold => Some([0.0; 2]),
+            Rung::Linear => Some(straight),
+            _ => predicted(predictions, used, cell),
+        };
+        now[used_index] = foreseen.map_or(now[LINEAR], |foreseen| error(foreseen, d));
+        trace.needs_all = is_its_turn || foreseen.is_none() || now[used_index] > FAILED;
+        if trace.needs_all {
+            return (sample, trace);
+        }
+        // What is richer has nothing left to explain.
+        let of_used = now[used_index];
+        now[used_index + 1..].fill(of_used);
+        now[LINEAR] = error(straight, d);
+        let is_measured = |index| index == HOLD || index == LINEAR || index >= used_index;
+        self.take_in(&mut sample, cell, &now, is_measured);
+        (sample, trace)
+    }
+
+    /// What was known of the surface of depth key `depth` at a cell of the key before.
+    #[inline(always)]
+    fn history(&self, [x, y]: [u16; 2], depth: u32) -> Option<&Sample> {
+        let (column, row) = (u32::from(x) / STRIDE, u32::from(y) / STRIDE);
+        if column >= self.before.width() || row >= self.before.height() {
+            return None;
+        }
+        let history = &self.before.row(row)[column as usize];
+        (history.keys > 0 && is_same_surface(history.depth, depth)).then_some(history)
+    }
+
+    /// (3).
+    #[inline(always)]
+    fn take_in(
+        &self,
+        sample: &mut Sample,
+        cell: [u16; 2],
+        now: &PerRung,
+        is_measured: impl Fn(usize) -> bool,
+    ) {
+        let Some(history) = self.history(cell, sample.depth) else {
+            // What nobody has measured is no better than nothing.
+            for (index, (mean, now)) in sample.mean.iter_mut().zip(now).enumerate() {
+                *mean = if is_measured(index) { *now } else { 1.0 };
+            }
+            (sample.keys, sample.lead) = (1, Lead { rung: self.image_rung });
+            return;
+        };
+        sample.lead = history.lead;
+        sample.keys = (history.keys + 1).min(KEYS);
+        let share = 1.0 / f32::from(sample.keys);
+        let means = sample.mean.iter_mut().zip(history.mean.iter().zip(now));
+        for (index, (mean, (before, now))) in means.enumerate() {
+            let way = if is_measured(index) { now - before } else { 0.0 };
+            *mean = before + way * share;
+        }
+    }
 }
 
-/// The sample at one cell.
-fn measure_one(
-    key: &KeyFrame,
-    grid: &Grid,
-    predictions: &Predictions<'_>,
-    before: &Plane<Sample>,
-    [x, y]: [u32; 2],
-    sample: &mut Sample,
-) {
-    let d = key.displacement.at(x, y);
-    let at = grid.centre(x, y);
-    let was = [at[0] - d[0], at[1] - d[1]];
-    let depth = (!key.depth.data().is_empty()).then_some(sample.depth);
-    let around = Around::new(predictions.models.grid(), was);
-    let Some((x, y)) = around.and_then(|around| around.nearest(predictions.key, depth)) else {
-        return;
-    };
-    let errors = errors(predictions, x, y, d);
-    let (column, row) = (x / STRIDE, y / STRIDE);
-    let is_held = column < before.width() && row < before.height();
-    let history = if is_held { before.at(column, row) } else { Sample::default() };
-    let is_its = history.keys > 0 && is_same_surface(history.depth, sample.depth);
-    if !is_its {
-        (sample.mean, sample.keys) = (errors, 1);
-        return;
-    }
-    sample.rung = history.rung;
-    sample.keys = (history.keys + 1).min(KEYS);
-    let share = 1.0 / f32::from(sample.keys);
-    for (mean, (before, now)) in sample.mean.iter_mut().zip(history.mean.iter().zip(errors)) {
-        *mean = before + (now - before) * share;
-    }
+/// Runs further on that those measured by the whole ladder lie in the next row: not below each other.
+const TURN_STEP: u32 = 5;
+
+/// The cell of the surface of depth key `depth` (any, if None) that is nearest to a place, if one
+/// of the four around it is.
+#[inline(always)]
+fn cell_at(predictions: &Predictions<'_>, was: [f32; 2], depth: Option<u32>) -> Option<[u32; 2]> {
+    let (key, grid) = (predictions.key, predictions.models.grid());
+    let around = Around::new(grid, was)?;
+    around.nearest(key, depth).map(|(x, y)| [x, y])
 }
 
-/// (1) and (2). A rung without an answer is the motion field.
-fn errors(predictions: &Predictions<'_>, x: u32, y: u32, d: [f32; 2]) -> PerRung {
-    let Predictions { key, models, older, phase } = *predictions;
-    let straight = key.displacement.at(x, y).map(|d| d * phase);
-    RUNGS.map(|rung| {
-        let curve = models.curve(rung, key, older, x, y);
-        let predicted = curve.map_or(straight, |curve| curve.at(phase));
-        let (dx, dy) = (predicted[0] - d[0], predicted[1] - d[1]);
-        let square = dx * dx + dy * dy;
-        if square.is_finite() { square / (square + CONTRAST_PX * CONTRAST_PX) } else { 1.0 }
-    })
+/// Fits the affine maps of the older key that the whole ladder is measured by.
+fn fit_affine(pool: &ThreadPool, predictions: &mut Predictions<'_>, traces: &Plane<Trace>) {
+    let [columns, rows] = predictions.models.lattice().points();
+    let runs = columns.div_ceil(LANES as u32);
+    let mut wanted = vec![false; (runs * rows) as usize];
+    for trace in traces.data().iter().filter(|trace| trace.needs_all) {
+        let [x, y] = trace.cell.map(u32::from);
+        wanted[(y / STRIDE * runs + x / STRIDE / LANES as u32) as usize] = true;
+    }
+    predictions.models.fit_affine(pool, |run, row| wanted[(row * runs + run) as usize]);
+}
+
+/// Where `rung` had said that the surface at a cell would be by now; None without an answer.
+#[inline(always)]
+fn predicted(predictions: &Predictions<'_>, rung: Rung, [x, y]: [u16; 2]) -> Option<[f32; 2]> {
+    let Predictions { key, models, older, phase } = predictions;
+    let curve = models.curve_of_sample(rung, key, *older, u32::from(x), u32::from(y));
+    curve.map(|curve| curve.at(*phase))
+}
+
+/// (1) and (2) of every rung. A rung without an answer is the motion field; one that was not
+/// prepared is no good.
+#[inline(always)]
+fn all_errors(predictions: &Predictions<'_>, cell: [u16; 2], d: [f32; 2]) -> PerRung {
+    let [x, y] = cell.map(u32::from);
+    let straight = straight(predictions, x, y);
+    let mut errors = [1.0; RUNGS.len()];
+    for (error_of, rung) in errors.iter_mut().zip(RUNGS) {
+        if predictions.models.has(rung) {
+            *error_of = error(predicted(predictions, rung, cell).unwrap_or(straight), d);
+        }
+    }
+    errors
+}
+
+/// Where the motion of a cell had said that it would be by now.
+#[inline(always)]
+fn straight(predictions: &Predictions<'_>, x: u32, y: u32) -> [f32; 2] {
+    let [dx, dy] = predictions.key.displacement.at(x, y);
+    [dx * predictions.phase, dy * predictions.phase]
+}
+
+/// (1) and (2).
+#[inline(always)]
+fn error(predicted: [f32; 2], d: [f32; 2]) -> f32 {
+    let (dx, dy) = (predicted[0] - d[0], predicted[1] - d[1]);
+    let square = dx * dx + dy * dy;
+    if square.is_finite() { square / (square + CONTRAST_PX * CONTRAST_PX) } else { 1.0 }
 }

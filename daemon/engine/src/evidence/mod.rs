@@ -17,6 +17,10 @@
 //! rung that the whole image would take, by the mean of m over it, is preferred the more, the fewer
 //! samples there are to judge a surface by.
 //!
+//! What is not needed is not measured: `hold`, `linear` and the rung in use always, the others where
+//! that has failed, and in a sixteenth of the samples in turn. A richer rung that is not
+//! measured counts as good as the one in use, which has not failed; a cheaper one keeps its mean.
+//!
 //! Geometry alone: nothing is warped for it, and nothing photometric makes it doubt. Floats,
 //! deterministic as in [`crate::trajectory`]; each sample for itself and sums row by row in order, so
 //! that the number of threads changes nothing.
@@ -29,16 +33,15 @@ mod tests;
 use rayon::ThreadPool;
 
 pub use measure::Predictions;
+use measure::{Measuring, OrderSums, Trace, WORLD};
 
-use crate::key::KeyFrame;
 use crate::plane::Plane;
 use crate::trajectory::camera_path::CameraOrder;
-use crate::trajectory::grid::Grid;
+use crate::trajectory::lattice::Lattice;
+pub use crate::trajectory::lattice::STRIDE;
 use crate::trajectory::rung::Rung;
 use crate::trajectory::surface::is_same_surface;
 
-/// Cells from one sample to the next, per axis.
-pub const STRIDE: u32 = 4;
 /// The rungs that are measured, cheapest first.
 pub const RUNGS: [Rung; 8] = [
     Rung::Hold,
@@ -55,24 +58,46 @@ pub type PerRung = [f32; RUNGS.len()];
 
 /// The place of a rung in [`RUNGS`].
 #[must_use]
-pub fn index_of(rung: Rung) -> usize {
-    RUNGS.iter().position(|other| *other == rung).expect("every rung is measured")
+#[inline(always)]
+pub const fn index_of(rung: Rung) -> usize {
+    match rung {
+        Rung::Hold => 0,
+        Rung::Global => 1,
+        Rung::Linear => 2,
+        Rung::Affine => 3,
+        Rung::Quadratic => 4,
+        Rung::World(order) => 5 + order as usize,
+    }
+}
+
+/// What leads a surface on from the newest key.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Lead {
+    /// The rung in use.
+    pub rung: Rung,
 }
 
 /// What is known of the surface at one sample of the newest key.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Sample {
-    /// Its depth key, 0 without depth.
-    pub depth: u32,
     /// m of (3).
     pub mean: PerRung,
+    /// Its depth key, 0 without depth.
+    pub depth: u32,
     /// n of (3), 0 where nothing has been measured.
     pub keys: u8,
-    /// Whether it moves with the world.
-    pub is_still: bool,
-    /// The rung in use.
-    pub rung: Rung,
+    /// What led it so far.
+    lead: Lead,
 }
+
+/// Runs of eight samples of which one is measured by the whole ladder, key by key in turn.
+const TURNS: u32 = 16;
+/// The same where nothing but the camera's order is asked for.
+const ORDER_TURNS: u32 = 4;
+/// Keys of which one is fitted a homography where none is in use.
+const GLOBAL_KEYS: u32 = 4;
+/// What [`Evidence::shared_rung`] has where cells have to look for their own.
+const MIXED: u8 = u8::MAX;
 
 /// The evidence of one stream, on the samples of its newest key.
 #[derive(Clone, Debug)]
@@ -80,6 +105,12 @@ pub struct Evidence {
     samples: Plane<Sample>,
     /// Those of the key before, while new ones are made.
     older: Plane<Sample>,
+    traces: Plane<Trace>,
+    leads: Plane<Lead>,
+    /// Per sample the index of the rung that it and all around it take, or [`MIXED`].
+    shared: Plane<u8>,
+    /// Keys taken in.
+    count: u32,
     order: CameraOrder,
     /// Error (2) of each order over the still world, averaged over keys.
     order_errors: Option<[f32; CameraOrder::ALL.len()]>,
@@ -93,6 +124,10 @@ impl Default for Evidence {
         Self {
             samples: Plane::default(),
             older: Plane::default(),
+            traces: Plane::default(),
+            leads: Plane::default(),
+            shared: Plane::default(),
+            count: 0,
             order: CameraOrder::default(),
             order_errors: None,
             image_rung: Rung::Affine,
@@ -101,27 +136,68 @@ impl Default for Evidence {
 }
 
 impl Evidence {
-    /// Takes in what `key` shows of the `predictions` of the key before it; None where there were
-    /// none. `is_still` says which cells of `key` move with the world.
+    /// Takes in what the new key, whose field is that of `lattice`, shows of the `predictions` of the
+    /// key before it; None where there were none. `is_still` says which samples move with the world.
     pub fn update(
         &mut self,
         pool: &ThreadPool,
-        key: &KeyFrame,
-        grid: &Grid,
-        predictions: Option<&Predictions<'_>>,
+        lattice: &Lattice,
+        predictions: Option<&mut Predictions<'_>>,
         is_still: impl Fn(u32, u32) -> bool + Sync,
+        orders_alone: bool,
     ) {
         std::mem::swap(&mut self.samples, &mut self.older);
-        measure::measure(pool, key, grid, predictions, &self.older, is_still, &mut self.samples);
-        if predictions.is_some() {
-            self.choose_order();
+        self.count = self.count.wrapping_add(1);
+        let turns = if orders_alone { ORDER_TURNS } else { TURNS };
+        let measuring = Measuring {
+            lattice,
+            before: &self.older,
+            image_rung: self.image_rung,
+            turn: [turns, self.count % turns],
+            orders_alone,
+        };
+        match predictions {
+            Some(predictions) => {
+                let (traces, samples) = (&mut self.traces, &mut self.samples);
+                let sums = measuring.measure(pool, predictions, is_still, traces, samples);
+                self.choose_order(&sums);
+            }
+            None => measuring.begin(pool, &mut self.samples),
         }
-        self.image_rung = choose::choose(pool, self.order, self.image_rung, &mut self.samples);
+        if !orders_alone {
+            self.choose_rungs(pool);
+        }
+    }
+
+    /// Gives every sample its rung.
+    fn choose_rungs(&mut self, pool: &ThreadPool) {
+        let Self { samples, leads, shared, order, image_rung, .. } = self;
+        *image_rung = choose::choose(pool, *order, *image_rung, samples, leads);
+        choose::share(pool, leads, shared);
+        // The next key's history.
+        for (sample, lead) in samples.data_mut().iter_mut().zip(leads.data()) {
+            sample.lead = *lead;
+        }
     }
 
     /// Forgets everything: the scene is another.
     pub fn cut(&mut self) {
-        *self = Self::default();
+        let kept = std::mem::take(self);
+        let Self { samples, older, traces, leads, shared, .. } = kept;
+        *self = Self { samples, older, traces, leads, shared, ..Self::default() };
+        for plane in [&mut self.samples, &mut self.older] {
+            plane.data_mut().fill(Sample::default());
+        }
+        self.leads.data_mut().fill(Lead { rung: self.image_rung });
+        self.shared.data_mut().fill(index_of(self.image_rung) as u8);
+    }
+
+    /// Whether the homography of the key to come is wanted: it is in use, or one of a few keys by which
+    /// it is judged.
+    #[must_use]
+    pub fn asks_for_global(&self) -> bool {
+        let is_used = || self.leads.data().iter().any(|lead| lead.rung == Rung::Global);
+        self.count.is_multiple_of(GLOBAL_KEYS) || is_used()
     }
 
     /// How the camera goes on best.
@@ -136,40 +212,57 @@ impl Evidence {
         &self.samples
     }
 
+    /// What leads the samples of the newest key on.
+    #[must_use]
+    pub fn leads(&self) -> &Plane<Lead> {
+        &self.leads
+    }
+
+    /// The rung that the cells of a sample share, with those of all samples around it.
+    #[must_use]
+    #[inline(always)]
+    pub fn shared_rung(&self, column: u32, row: u32) -> Option<Rung> {
+        RUNGS.get(usize::from(self.shared.at(column, row))).copied()
+    }
+
+    /// The rung that all samples share, if they do.
+    #[must_use]
+    pub fn rung_of_all(&self) -> Option<Rung> {
+        let (first, rest) = self.shared.data().split_first()?;
+        let is_one = rest.iter().all(|shared| shared == first);
+        RUNGS.get(usize::from(*first)).copied().filter(|_| is_one)
+    }
+
     /// The rung of a cell of depth key `depth` of the newest key: that of the sample of its surface
     /// which is nearest to it among its own and those around, else the image's.
     #[must_use]
     #[inline(always)]
     pub fn rung_at(&self, x: u32, y: u32, depth: u32) -> Rung {
         let (column, row) = (x / STRIDE, y / STRIDE);
-        let own = self.samples.at(column, row);
-        if is_same_surface(own.depth, depth) {
-            return own.rung;
+        let is_its = |column: u32, row: u32| {
+            is_same_surface(self.samples.row(row)[column as usize].depth, depth)
+        };
+        if is_its(column, row) {
+            return self.leads.at(column, row).rung;
         }
         let last = [self.samples.width() - 1, self.samples.height() - 1];
         let rows = row.saturating_sub(1)..=(row + 1).min(last[1]);
         let mut around = rows.flat_map(|row| {
             let columns = column.saturating_sub(1)..=(column + 1).min(last[0]);
-            columns.map(move |column| self.samples.at(column, row))
+            columns.map(move |column| (column, row))
         });
-        let found = around.find(|sample| is_same_surface(sample.depth, depth));
-        found.map_or(self.image_rung, |sample| sample.rung)
+        let found = around.find(|(column, row)| is_its(*column, *row));
+        found.map_or(self.image_rung, |(column, row)| self.leads.at(column, row).rung)
     }
 
     /// Chooses the camera's order from the still samples that have just been measured.
-    fn choose_order(&mut self) {
-        const WORLD: usize = RUNGS.len() - CameraOrder::ALL.len();
-        let (mut sum, mut count) = ([0.0; CameraOrder::ALL.len()], 0.0);
-        for sample in self.samples.data().iter().filter(|s| s.is_still && s.keys > 0) {
-            for (sum, mean) in sum.iter_mut().zip(&sample.mean[WORLD..]) {
-                *sum += mean;
-            }
-            count += 1.0;
-        }
+    fn choose_order(&mut self, sums: &OrderSums) {
+        const ORDERS: usize = RUNGS.len() - WORLD;
+        let count = sums[ORDERS];
         if count == 0.0 {
             return;
         }
-        let now = sum.map(|sum| sum / count);
+        let now: [f32; ORDERS] = std::array::from_fn(|order| sums[order] / count);
         let errors = match self.order_errors {
             Some(before) => std::array::from_fn(|i| 0.5 * (before[i] + now[i])),
             None => now,

@@ -3,7 +3,7 @@
 use glam::{DMat4, DVec3};
 
 use super::*;
-use crate::key::{Acceleration, Camera};
+use crate::key::{Acceleration, Camera, KeyFrame};
 use crate::method::Method;
 use crate::plane::Rect;
 use crate::testing::{plane, pool};
@@ -51,7 +51,7 @@ fn climbed(method: Method, keys: impl Iterator<Item = KeyFrame>) -> (Ladder, Key
 
 /// The rung of the sample that holds a cell.
 fn rung(ladder: &Ladder, x: u32, y: u32) -> Rung {
-    ladder.evidence().samples().at(x / STRIDE, y / STRIDE).rung
+    ladder.evidence().leads().at(x / STRIDE, y / STRIDE).rung
 }
 
 fn is_disc(x: u32, y: u32) -> bool {
@@ -96,7 +96,7 @@ fn what_falls_is_found_to_accelerate() {
 fn where_nothing_moves_everything_is_held_and_nothing_accelerates() {
     let keys = (0..3).map(|index| key(index, |_, _| FAR, |x, y| [x as f32, y as f32]));
     let (ladder, last) = climbed(Method::Auto, keys);
-    assert!(ladder.evidence().samples().data().iter().all(|sample| sample.rung == Rung::Hold));
+    assert_eq!(ladder.evidence().rung_of_all(), Some(Rung::Hold));
     assert!(last.velocity.data().iter().all(|v| *v == Default::default()));
     assert!(last.acceleration.data().is_empty());
 }

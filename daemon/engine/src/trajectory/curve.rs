@@ -13,6 +13,7 @@
 //! its size.
 
 use crate::key::{Acceleration, Velocity};
+use crate::lanes::both;
 use crate::trajectory::dilate_motion::MAX_DISPLACEMENT_PX;
 
 /// Displacements of one point from its place at the key, pixels.
@@ -55,14 +56,14 @@ impl Curve {
     #[inline(always)]
     pub fn at(&self, p: f32) -> [f32; 2] {
         let (v, a) = self.parts();
-        [0, 1].map(|axis| p * (v[axis] + 0.5 * p * a[axis]))
+        both(|axis| p * (v[axis] + 0.5 * p * a[axis]))
     }
 
     /// Velocity and acceleration (1).
     #[inline(always)]
     fn parts(&self) -> ([f32; 2], [f32; 2]) {
-        let v = [0, 1].map(|axis| 4.0 * self.half[axis] - self.one[axis]);
-        let a = [0, 1].map(|axis| 4.0 * self.one[axis] - 8.0 * self.half[axis]);
+        let v = both(|axis| 4.0 * self.half[axis] - self.one[axis]);
+        let a = both(|axis| 4.0 * self.one[axis] - 8.0 * self.half[axis]);
         (v, a)
     }
 
@@ -72,20 +73,75 @@ impl Curve {
     #[must_use]
     #[inline(always)]
     pub fn quantise(&self) -> (Velocity, Acceleration) {
-        // Written so that NaN fails it.
-        let fits =
-            |d: [f32; 2]| (d[0].abs() <= MAX_DISPLACEMENT_PX) & (d[1].abs() <= MAX_DISPLACEMENT_PX);
         if !fits(self.one) {
             return (Velocity::UNTRACKABLE, Acceleration::default());
         }
         let (v, a) = self.parts();
-        let is_held = fits(v) & fits(a);
-        let (v, a) = if is_held { (v, a) } else { (self.one, [0.0; 2]) };
-        let [x, y] = v.map(steps);
-        let velocity = Velocity { x, y };
-        let [x, y] = a.map(steps);
-        (velocity, Acceleration { x, y })
+        let (v, a) = held(self.one, v, a);
+        let velocity = Velocity { x: steps(v[0]), y: steps(v[1]) };
+        (velocity, Acceleration { x: steps(a[0]), y: steps(a[1]) })
     }
+}
+
+/// Velocity and acceleration of some neighbouring cells, pixels per span; NaN where a model has no
+/// answer.
+#[derive(Clone, Copy, Debug)]
+pub struct Curves<const N: usize> {
+    /// Right and down.
+    pub velocity: [[f32; N]; 2],
+    /// Right and down.
+    pub acceleration: [[f32; N]; 2],
+}
+
+impl<const N: usize> Curves<N> {
+    /// Where there is no answer, the straight lines of these motions.
+    #[inline(always)]
+    pub fn or_straight(&mut self, displacement: &[[f32; 2]]) {
+        for (i, d) in displacement.iter().take(N).enumerate() {
+            // NaN in either part, and only that, makes the sum differ from itself.
+            let sum = self.velocity[0][i] + self.velocity[1][i];
+            let sum = sum + (self.acceleration[0][i] + self.acceleration[1][i]);
+            let is_known = sum.is_finite();
+            for (axis, d) in d.iter().enumerate() {
+                let (v, a) = (self.velocity[axis][i], self.acceleration[axis][i]);
+                self.velocity[axis][i] = if is_known { v } else { *d };
+                self.acceleration[axis][i] = if is_known { a } else { 0.0 };
+            }
+        }
+    }
+
+    /// As [`Curve::quantise`], without a branch.
+    #[inline(always)]
+    pub fn quantise(&self) -> ([Velocity; N], [Acceleration; N]) {
+        let mut velocities = [Velocity::default(); N];
+        let mut accelerations = [Acceleration::default(); N];
+        for i in 0..N {
+            let v = [self.velocity[0][i], self.velocity[1][i]];
+            let a = [self.acceleration[0][i], self.acceleration[1][i]];
+            let one = [v[0] + 0.5 * a[0], v[1] + 0.5 * a[1]];
+            let (v, a) = held(one, v, a);
+            let is_tracked = fits(one);
+            let step = |d: f32| if is_tracked { steps(d) } else { 0 };
+            let none = |d: i16| if is_tracked { d } else { i16::MIN };
+            velocities[i] = Velocity { x: none(step(v[0])), y: none(step(v[1])) };
+            accelerations[i] = Acceleration { x: step(a[0]), y: step(a[1]) };
+        }
+        (velocities, accelerations)
+    }
+}
+
+/// Whether it is no farther than [`MAX_DISPLACEMENT_PX`]; written so that NaN is not.
+#[inline(always)]
+fn fits(d: [f32; 2]) -> bool {
+    (d[0].abs() <= MAX_DISPLACEMENT_PX) & (d[1].abs() <= MAX_DISPLACEMENT_PX)
+}
+
+/// Velocity and acceleration where both fit, else the line to the place at phase 1.
+#[inline(always)]
+fn held(one: [f32; 2], v: [f32; 2], a: [f32; 2]) -> ([f32; 2], [f32; 2]) {
+    let is_held = fits(v) & fits(a);
+    let pick = |part: f32, other: f32| if is_held { part } else { other };
+    ([pick(v[0], one[0]), pick(v[1], one[1])], [pick(a[0], 0.0), pick(a[1], 0.0)])
 }
 
 /// 1/32 pixels, rounded half away from zero.

@@ -82,7 +82,8 @@ impl Homography {
 
 #[inline(always)]
 fn moved(h: &[[f32; 3]; 3], [x, y]: [f32; 2]) -> [f32; 2] {
-    let [to_x, to_y, w] = h.map(|row| row[0] * x + row[1] * y + row[2]);
+    let part = |row: &[f32; 3]| row[0] * x + row[1] * y + row[2];
+    let [to_x, to_y, w] = [part(&h[0]), part(&h[1]), part(&h[2])];
     let w = if w > 1e-6 { w } else { f32::NAN };
     [to_x / w - x, to_y / w - y]
 }

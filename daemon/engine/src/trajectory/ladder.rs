@@ -7,21 +7,25 @@
 //!
 //! Where a rung has no answer, the motion field itself goes on: [`Rung::Linear`].
 
-use foreframe_perception::tracking::tracked_share;
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use rayon::ThreadPool;
 
 use super::affine::AffineField;
 use super::camera_path::{CameraOrder, CameraPath, Pose};
 use super::curve::Curve;
 use super::dilate_motion::dilate_cells;
+use super::fill::{Filling, Run};
 use super::global::Homography;
 use super::grid::Grid;
+use super::lattice::{Lattice, STRIDE, middle};
 use super::quadratic::Quadratic;
 use super::rung::Rung;
 use super::world::World;
 use crate::bands::for_each_row_of_two;
 use crate::evidence::{Evidence, Predictions};
 use crate::key::{Acceleration, Camera, KeyFrame, Velocity};
+use crate::lanes::LANES;
 use crate::method::Method;
 use crate::plane::Plane;
 use crate::time::MonoTime;
@@ -30,6 +34,7 @@ use crate::time::MonoTime;
 #[derive(Clone, Debug, Default)]
 pub struct Models {
     grid: Grid,
+    lattice: Lattice,
     global: Option<Homography>,
     affine: AffineField,
     /// By [`CameraOrder`].
@@ -45,10 +50,52 @@ impl Models {
         &self.grid
     }
 
-    /// The model of a camera order.
+    /// The key's field at the lattice's points.
+    #[must_use]
+    pub fn lattice(&self) -> &Lattice {
+        &self.lattice
+    }
+
+    /// The affine maps that have been fitted.
+    #[must_use]
+    pub fn affine(&self) -> &AffineField {
+        &self.affine
+    }
+
+    /// Fits the runs of eight lattice points that are `wanted`, by number and row.
+    pub fn fit_affine(&mut self, pool: &ThreadPool, wanted: impl Fn(u32, u32) -> bool + Sync) {
+        self.affine.fit(pool, &self.lattice, &self.grid, wanted);
+    }
+
+    /// The model of a camera order: that of the late pose, where there is one.
     #[must_use]
     pub fn world(&self, order: CameraOrder) -> Option<&World> {
-        self.worlds[order as usize].as_ref()
+        self.late.as_ref().or(self.worlds[order as usize].as_ref())
+    }
+
+    /// Whether a rung was prepared, so that it may have answers.
+    #[must_use]
+    #[inline(always)]
+    pub fn has(&self, rung: Rung) -> bool {
+        rung != Rung::Global || self.global.is_some()
+    }
+
+    /// [`Models::curve`] of a cell for the evidence: affine by one fit and not by the mean of four.
+    #[must_use]
+    #[inline(always)]
+    pub fn curve_of_sample(
+        &self,
+        rung: Rung,
+        key: &KeyFrame,
+        older: Option<&Quadratic<'_>>,
+        x: u32,
+        y: u32,
+    ) -> Option<Curve> {
+        if rung != Rung::Affine {
+            return self.curve(rung, key, older, x, y);
+        }
+        let depth = if key.depth.data().is_empty() { 0 } else { key.depth.at(x, y) };
+        self.affine.curve_by_own(&self.grid, [x, y], depth, key.displacement.at(x, y))
     }
 
     /// Whether a late pose says where the surface of a cell goes on to: it moves with the world.
@@ -77,8 +124,7 @@ impl Models {
             Rung::Affine => self.affine.curve(key, grid, x, y),
             Rung::Quadratic => older.and_then(|older| older.curve(key, grid, x, y)),
             Rung::World(order) => {
-                let world = self.late.as_ref().or(self.worlds[order as usize].as_ref());
-                world.map(|world| world.curve(key, older, grid, x, y))
+                self.world(order).map(|world| world.curve(key, older, grid, x, y))
             }
         };
         curve.filter(Curve::is_known)
@@ -177,11 +223,12 @@ impl Ladder {
             self.evidence.cut();
             return;
         }
-        let models = self.prepare(pool, key);
+        let mut models = self.prepare(pool, key);
         if !matches!(self.choice, Choice::Always(_)) {
             let followed = older.filter(|older| key.motion_from == Some(older.content_time));
             self.weigh(pool, key, &models, followed, before);
         }
+        self.fit_affine(pool, &mut models);
         self.spare = std::mem::replace(&mut self.models, models);
         self.models.late = self.late_world(key);
         self.fill(pool, key, older);
@@ -230,43 +277,67 @@ impl Ladder {
         &mut self,
         pool: &ThreadPool,
         key: &KeyFrame,
-        models: &Models,
+        new: &Models,
         older: Option<&KeyFrame>,
         before: Option<&KeyFrame>,
     ) {
         let older = older.filter(|older| !older.displacement.data().is_empty());
         let quadratic = older.zip(before).and_then(|(older, before)| Quadratic::new(older, before));
-        let predictions = older.and_then(|older| {
+        let models = &mut self.models;
+        let mut predictions = older.and_then(|older| {
             let after = (key.content_time - older.content_time).as_secs_f64();
             let phase = (after / older.motion_span()?.as_secs_f64()) as f32;
-            Some(Predictions { key: older, models: &self.models, older: quadratic.as_ref(), phase })
+            Some(Predictions { key: older, models, older: quadratic.as_ref(), phase })
         });
-        let world = models.worlds[0].as_ref();
-        let is_still =
-            |x: u32, y: u32| world.is_some_and(|world| world.is_still(key, &models.grid, x, y));
-        self.evidence.update(pool, key, &models.grid, predictions.as_ref(), is_still);
+        let world = new.worlds[0].as_ref();
+        let is_still = |column: u32, row: u32| {
+            let [x, y] = [(column, 0), (row, 1)].map(|(i, axis)| middle(i, new.grid.cells[axis]));
+            world.is_some_and(|world| world.is_still(key, &new.grid, x, y))
+        };
+        let orders_alone = self.choice == Choice::World;
+        self.evidence.update(pool, &new.lattice, predictions.as_mut(), is_still, orders_alone);
     }
 
-    /// Works out what the rungs need of `key`.
+    /// Works out what the rungs need of `key`, but for the affine maps.
     fn prepare(&mut self, pool: &ThreadPool, key: &KeyFrame) -> Models {
         // Their buffers go round: those of the key before last are taken over.
         let mut models = std::mem::take(&mut self.spare);
         models.grid = Grid::of(key);
-        let uses = |rung| match self.choice {
-            Choice::Always(always) => always == rung,
+        models.lattice.update(pool, key, &models.grid);
+        models.affine.clear(&models.lattice);
+        let uses_global = match self.choice {
+            Choice::Always(rung) => rung == Rung::Global,
             Choice::World => false,
-            Choice::Evidence => true,
+            Choice::Evidence => self.evidence.asks_for_global(),
         };
-        if uses(Rung::Global) {
-            models.global = Homography::fit(key, &models.grid);
-        }
-        if uses(Rung::Affine) {
-            models.affine.update(pool, key, &models.grid);
-        }
+        models.global = if uses_global { Homography::fit(key, &models.grid) } else { None };
         if !matches!(self.choice, Choice::Always(_)) {
             models.worlds = self.worlds(key);
         }
         models
+    }
+
+    /// Fits the affine maps that cells take.
+    fn fit_affine(&self, pool: &ThreadPool, models: &mut Models) {
+        match self.choice {
+            Choice::Always(Rung::Affine) => models.fit_affine(pool, |_, _| true),
+            Choice::Evidence => {
+                let evidence = &self.evidence;
+                let last = models.lattice.points().map(|points| points - 1);
+                models.fit_affine(pool, |run, row| {
+                    // Cells read the points around them.
+                    let first = (run * LANES as u32).saturating_sub(1);
+                    let columns = first..=((run + 1) * LANES as u32).min(last[0]);
+                    let mut rows = row.saturating_sub(1)..=(row + 1).min(last[1]);
+                    rows.any(|row| {
+                        columns
+                            .clone()
+                            .any(|column| evidence.leads().at(column, row).rung == Rung::Affine)
+                    })
+                });
+            }
+            _ => {}
+        }
     }
 
     /// The camera's ways on from `key`, where depth, cameras and times tell them.
@@ -287,45 +358,47 @@ impl Ladder {
 
     /// Fills in velocity and acceleration of `key`.
     fn fill(&mut self, pool: &ThreadPool, key: &mut KeyFrame, older: Option<&KeyFrame>) {
+        let one_for_all = match self.choice {
+            Choice::Always(rung) => Some(rung),
+            Choice::World => Some(Rung::World(self.evidence.order())),
+            Choice::Evidence if self.models.late.is_some() => None,
+            Choice::Evidence => self.evidence.rung_of_all(),
+        };
+        let is_decoded = key.velocity.data().len() == key.displacement.data().len();
+        if one_for_all == Some(Rung::Linear) && is_decoded {
+            // The field as it was decoded.
+            key.acceleration.resize(0, 0);
+            return;
+        }
         let quadratic = older.and_then(|older| Quadratic::new(key, older));
         let [width, height] = self.models.grid.cells;
         self.velocity.resize(width, height);
         self.acceleration.resize(width, height);
         let px_per_span = self.px_per_span(key);
-        let (models, evidence, held) = (&self.models, &self.evidence, &*key);
-        let has_depth = !key.depth.data().is_empty();
-        let (choice, order) = (self.choice, self.evidence.order());
+        let filling = Filling { models: &self.models, key, older: quadratic.as_ref(), px_per_span };
+        let evidence = &self.evidence;
+        let accelerates = AtomicBool::new(false);
         for_each_row_of_two(
             pool,
             &mut self.velocity,
             &mut self.acceleration,
             #[inline(always)]
-            |y, velocities, accelerations| {
-                let cells = (0..).zip(velocities.iter_mut().zip(accelerations));
-                for (x, (velocity, acceleration)) in cells {
-                    let rung = match choice {
-                        Choice::Always(rung) => rung,
-                        Choice::World => Rung::World(order),
-                        Choice::Evidence if models.is_led_by_late_camera(held, x, y) => {
-                            Rung::World(order)
-                        }
-                        Choice::Evidence => {
-                            let depth = if has_depth { held.depth.at(x, y) } else { 0 };
-                            evidence.rung_at(x, y, depth)
-                        }
-                    };
-                    let curve = models
-                        .curve(rung, held, quadratic.as_ref(), x, y)
-                        .unwrap_or_else(|| Curve::straight(held.displacement.at(x, y)));
-                    (*velocity, *acceleration) = damped(curve, px_per_span).quantise();
+            |y, velocity, acceleration| {
+                let run = Run { x: 0, y, velocity, acceleration };
+                match one_for_all {
+                    Some(rung) => filling.by(rung, run),
+                    None => fill_row(&filling, evidence, run),
+                }
+                if acceleration.iter().any(|a| *a != Acceleration::default()) {
+                    accelerates.store(true, Ordering::Relaxed);
                 }
             },
         );
         dilate_cells(pool, &key.depth, &self.velocity, &mut key.velocity);
-        if self.acceleration.data().iter().all(|a| *a == Acceleration::default()) {
-            key.acceleration.resize(0, 0);
-        } else {
+        if accelerates.into_inner() {
             dilate_cells(pool, &key.depth, &self.acceleration, &mut key.acceleration);
+        } else {
+            key.acceleration.resize(0, 0);
         }
     }
 
@@ -337,11 +410,46 @@ impl Ladder {
     }
 }
 
-/// The part of a curve that an eye can follow: (3) and (4) of [`super::dilate_motion`], of its chord.
+/// Fills in a row, sample by sample: runs of samples that share a rung, and cells of others, which
+/// look for their own.
 #[inline(always)]
-fn damped(curve: Curve, px_per_span: Option<f32>) -> Curve {
-    let Some(px_per_span) = px_per_span else { return curve };
-    let [x, y] = curve.one;
-    let share = tracked_share(libm::sqrtf(x * x + y * y) / px_per_span);
-    Curve { half: curve.half.map(|d| d * share), one: curve.one.map(|d| d * share) }
+fn fill_row(filling: &Filling<'_>, evidence: &Evidence, mut row: Run<'_>) {
+    let (y, width) = (row.y, row.velocity.len() as u32);
+    let columns = evidence.samples().width();
+    let models = filling.models;
+    let is_late = models.late.is_some();
+    let rung_of = |column| {
+        if is_late { None } else { evidence.shared_rung(column, y / STRIDE) }
+    };
+    let mut column = 0;
+    while column < columns {
+        let rung = rung_of(column);
+        let first = column;
+        column += 1;
+        while column < columns && rung_of(column) == rung {
+            column += 1;
+        }
+        let end = (column * STRIDE).min(width);
+        let run = row.take((end - first * STRIDE) as usize);
+        match rung {
+            Some(rung) => filling.by(rung, run),
+            None => fill_mixed(filling, evidence, run),
+        }
+    }
+}
+
+/// Fills in cells that each look for their rung.
+fn fill_mixed(filling: &Filling<'_>, evidence: &Evidence, run: Run<'_>) {
+    let Filling { models, key, .. } = filling;
+    let has_depth = !key.depth.data().is_empty();
+    let cells = (run.x..).zip(run.velocity.iter_mut().zip(run.acceleration));
+    for (x, (velocity, acceleration)) in cells {
+        let rung = if models.is_led_by_late_camera(key, x, run.y) {
+            Rung::World(evidence.order())
+        } else {
+            let depth = if has_depth { key.depth.at(x, run.y) } else { 0 };
+            evidence.rung_at(x, run.y, depth)
+        };
+        (*velocity, *acceleration) = filling.one(rung, x, run.y);
+    }
 }

@@ -15,6 +15,7 @@ use super::curve::Curve;
 use super::grid::Grid;
 use super::surface::Around;
 use crate::key::KeyFrame;
+use crate::lanes::both;
 
 /// The older of two fields, and how it is read.
 #[derive(Clone, Copy, Debug)]
@@ -60,8 +61,7 @@ impl<'a> Quadratic<'a> {
         let was = [at[0] - d[0], at[1] - d[1]];
         let depth = (!key.depth.data().is_empty()).then(|| key.depth.at(x, y));
         let before = Around::new(&self.grid, was)?.motion(self.older, depth)?;
-        let a =
-            [0, 1].map(|axis| (d[axis] - before[axis] / self.ratio) * (2.0 / (1.0 + self.ratio)));
+        let a = both(|axis| (d[axis] - before[axis] / self.ratio) * (2.0 / (1.0 + self.ratio)));
         Some(Curve::accelerated([d[0] + 0.5 * a[0], d[1] + 0.5 * a[1]], a))
     }
 }

@@ -19,10 +19,11 @@
 //! vectors.
 
 use super::camera_path::{Onward, Reprojection};
-use super::curve::Curve;
+use super::curve::{Curve, Curves};
 use super::grid::Grid;
 use super::quadratic::Quadratic;
 use crate::key::{Camera, KeyFrame};
+use crate::lanes::both;
 use crate::time::MonoSpan;
 
 /// Own motion, pixels per span and axis, up to which a surface moves with the world: more than the
@@ -92,12 +93,46 @@ impl World {
         let then = self.from_older.scaled(was, self.inverse_distance(before));
         let now = [at[0] / q, at[1] / q, 1.0 / q];
         let seen = |by: &Reprojection, p: f32| {
-            let [x, y, w] = [0, 1, 2].map(|i| now[i] + (now[i] - then[i]) * p);
+            let part = |i: usize| now[i] + (now[i] - then[i]) * p;
+            let [x, y, w] = [part(0), part(1), part(2)];
             let w = if w > 0.0 { w } else { f32::NAN };
             let place = by.place([x / w, y / w], 1.0 / w);
             [place[0] - at[0], place[1] - at[1]]
         };
         Curve { half: seen(&self.half, 0.5), one: seen(&self.one, 1.0) }
+    }
+
+    /// (2) of `N` cells from (`x`, `y`) on; None where one of them moves on its own.
+    #[must_use]
+    #[inline(always)]
+    pub fn still_curves<const N: usize>(
+        &self,
+        key: &KeyFrame,
+        grid: &Grid,
+        x: u32,
+        y: u32,
+    ) -> Option<Curves<N>> {
+        let start = y as usize * grid.cells[0] as usize + x as usize;
+        let depth: &[u32; N] = key.depth.data().get(start..)?.first_chunk()?;
+        let displacement: &[[f32; 2]; N] = key.displacement.data().get(start..)?.first_chunk()?;
+        let mut curves = Curves { velocity: [[0.0; N]; 2], acceleration: [[0.0; N]; 2] };
+        let mut is_still = true;
+        for i in 0..N {
+            let at = grid.centre(x + i as u32, y);
+            let q = self.inverse_distance(depth[i]);
+            let own = self.own_motion(at, q, displacement[i]);
+            let own = both(|axis| if depth[i] == 0 { 0.0 } else { own[axis] });
+            is_still &= is_small(own);
+            let (half, one) = (self.half.place(at, q), self.one.place(at, q));
+            for axis in 0..2 {
+                let half = half[axis] - at[axis] + 0.5 * own[axis];
+                let one = one[axis] - at[axis] + own[axis];
+                curves.velocity[axis][i] = 4.0 * half - one;
+                curves.acceleration[axis][i] = 4.0 * one - 8.0 * half;
+            }
+        }
+        curves.or_straight(displacement);
+        is_still.then_some(curves)
     }
 
     /// 1 / w of a depth key.
@@ -111,7 +146,7 @@ impl World {
     #[inline(always)]
     fn own_motion(&self, at: [f32; 2], q: f32, displacement: [f32; 2]) -> [f32; 2] {
         let was = self.older.place(at, q);
-        let own = [0, 1].map(|axis| displacement[axis] - (at[axis] - was[axis]));
+        let own = both(|axis| displacement[axis] - (at[axis] - was[axis]));
         let is_known = own[0].is_finite() & own[1].is_finite();
         if is_known { own } else { [0.0; 2] }
     }

@@ -1,7 +1,7 @@
 //! The derivative of the motion field along surfaces.
 //!
-//! At each point of a lattice of cells, J is fitted by least squares to the motion of the cells
-//! around it that lie on the surface of its middle one:
+//! At each lattice point J is fitted by least squares to the motion of the 5x5 points around it
+//! that lie on its surface:
 //!
 //! ```text
 //! (4) minimise  sum of w |D(x + e) - D0 - J e|^2  +  RIDGE |J|^2
@@ -9,225 +9,181 @@
 //!
 //! over D0 and J, with Cauchy weights w of the residual before, so that another object at the same
 //! distance counts little. The ridge keeps J at 0 along a direction in which a thin surface has no
-//! extent.
+//! extent. Eight neighbouring points are fitted at once.
 
-use rayon::ThreadPool;
+use super::power::{Matrix, Power};
+use crate::lanes::{LANES, Lanes, both};
+use crate::trajectory::lattice::{Lattice, MARGIN};
 
-use super::power::{Matrix, continued};
-use crate::bands::for_each_row;
-use crate::key::KeyFrame;
-use crate::plane::Plane;
-use crate::trajectory::curve::Curve;
-use crate::trajectory::grid::Grid;
-use crate::trajectory::surface::is_same_surface;
-
-/// Cells from one lattice point to the next.
-const STRIDE: u32 = 4;
-/// Reach of a fit in cells, and the step between those that it reads: 5x5 of them.
-const REACH: i32 = 8;
-const STEP: i32 = 4;
-/// Cells that a fit reads at most.
-const WINDOW: usize = ((2 * REACH / STEP + 1) * (2 * REACH / STEP + 1)) as usize;
-/// Fewest cells of one surface that a fit takes.
-const MIN_CELLS: usize = 7;
+/// Points of a window per axis.
+const SIDE: usize = 2 * MARGIN + 1;
+/// Fewest points of one surface that a fit takes.
+const MIN_POINTS: f32 = 7.0;
 /// Rounds of reweighting.
 const ROUNDS: usize = 3;
-/// Residual, pixels, at which a cell's weight has halved.
+/// Residual, pixels, at which a point's weight has halved.
 const HALF_WEIGHT_PX: f32 = 0.5;
 /// Ridge of (4), cells squared: that of one cell two cells away.
 const RIDGE: f32 = 4.0;
-/// A fit predicts the motion of a cell that it is of to this many pixels.
-const AGREES_PX: f32 = 0.5;
 
 /// What was fitted at a lattice point.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
-struct Fit {
+pub(super) struct Fit {
     /// Depth key of the surface.
-    depth: u32,
-    is_known: bool,
+    pub(super) depth: u32,
+    pub(super) is_known: bool,
     /// Its motion at the lattice point, pixels per span.
-    d: [f32; 2],
+    pub(super) d: [f32; 2],
     /// Derivative of the motion, per pixel.
-    j: Matrix,
+    pub(super) j: Matrix,
+    /// How motions there go on.
+    pub(super) power: Power,
 }
 
-/// The derivative of one key's motion field.
-#[derive(Clone, Debug, Default)]
-pub struct AffineField {
-    lattice: Plane<Fit>,
+/// The points around eight, and which of them count.
+struct Window {
+    /// 1 where a point is on the surface of the middle and its motion is known, else 0.
+    on: [Lanes; SIDE * SIDE],
+    /// Its motion, 0 where it does not count.
+    d: [[Lanes; 2]; SIDE * SIDE],
+    /// Way from the middle to the columns and to the rows, pixels.
+    right: [Lanes; SIDE],
+    down: [Lanes; SIDE],
 }
 
-impl AffineField {
-    /// Fits the field of `key`, which has motion.
-    pub fn update(&mut self, pool: &ThreadPool, key: &KeyFrame, grid: &Grid) {
-        let [columns, rows] = grid.cells.map(|cells| cells.div_ceil(STRIDE));
-        self.lattice.resize(columns, rows);
-        for_each_row(pool, &mut self.lattice, |row, fits| {
-            for (column, fit) in (0..).zip(fits) {
-                *fit = fit_at(key, grid, middle(column, grid.cells[0]), middle(row, grid.cells[1]));
-            }
-        });
-    }
+/// The affine maps of eight points.
+#[derive(Clone, Copy)]
+struct Maps {
+    d: [Lanes; 2],
+    j: [[Lanes; 2]; 2],
+}
 
-    /// (3) of a cell. None where no fit around it explains its motion.
-    #[must_use]
+impl Maps {
     #[inline(always)]
-    pub fn curve(&self, key: &KeyFrame, grid: &Grid, x: u32, y: u32) -> Option<Curve> {
-        if self.lattice.data().is_empty() {
-            return None;
-        }
-        let d = key.displacement.at(x, y);
-        let depth = if key.depth.data().is_empty() { 0 } else { key.depth.at(x, y) };
-        let (mut weights, mut sum) = (0.0, [[0.0; 2]; 2]);
-        for (column, weight_x) in around(x, self.lattice.width()) {
-            for (row, weight_y) in around(y, self.lattice.height()) {
-                let fit = self.lattice.at(column, row);
-                let (fit_x, fit_y) = (middle(column, grid.cells[0]), middle(row, grid.cells[1]));
-                let e = offset(grid, [fit_x, fit_y], [x, y]);
-                let predicted = predict(&fit, e);
-                let (dx, dy) = (predicted[0] - d[0], predicted[1] - d[1]);
-                let is_its = fit.is_known
-                    & is_same_surface(fit.depth, depth)
-                    & (dx * dx + dy * dy < AGREES_PX * AGREES_PX);
-                let weight = if is_its { weight_x * weight_y } else { 0.0 };
-                weights += weight;
-                for (sum, j) in sum.as_flattened_mut().iter_mut().zip(fit.j.as_flattened()) {
-                    *sum += weight * j;
-                }
-            }
-        }
-        if weights <= 0.0 {
-            return None;
-        }
-        continued(d, &sum.map(|row| row.map(|j| j / weights)))
+    fn predict(&self, e: [Lanes; 2]) -> [Lanes; 2] {
+        both(|axis| self.d[axis] + self.j[axis][0] * e[0] + self.j[axis][1] * e[1])
     }
 }
 
-/// The cell at the middle of a lattice point's cells.
+/// Fits eight lattice points of `row` from `column` on; `step` is a cell's size in pixels.
 #[inline(always)]
-fn middle(index: u32, cells: u32) -> u32 {
-    (index * STRIDE + STRIDE / 2).min(cells - 1)
-}
-
-/// The two lattice points around a cell along an axis with their weights, none of them 0.
-#[inline(always)]
-#[expect(clippy::cast_precision_loss, reason = "at most a few cells")]
-fn around(cell: u32, points: u32) -> [(u32, f32); 2] {
-    let place = (cell + STRIDE / 2) as f32 / STRIDE as f32;
-    let next = (cell + STRIDE / 2) / STRIDE;
-    // Half a cell aside, so that a cell on a lattice point is still lent to by the next.
-    let way = place - next as f32 + 0.5 / STRIDE as f32;
-    [(next.max(1) - 1, 1.0 - way), (next.min(points - 1), way)]
-}
-
-/// From one cell to another, pixels.
-#[inline(always)]
-fn offset(grid: &Grid, from: [u32; 2], to: [u32; 2]) -> [f32; 2] {
-    let (from, to) = (grid.centre(from[0], from[1]), grid.centre(to[0], to[1]));
-    [to[0] - from[0], to[1] - from[1]]
-}
-
-/// D0 + J e.
-#[inline(always)]
-fn predict(fit: &Fit, e: [f32; 2]) -> [f32; 2] {
-    [0, 1].map(|axis| fit.d[axis] + fit.j[axis][0] * e[0] + fit.j[axis][1] * e[1])
-}
-
-/// A cell of the window: its offset in pixels and its motion.
-#[derive(Clone, Copy, Default)]
-struct Neighbour {
-    e: [f32; 2],
-    d: [f32; 2],
-}
-
-fn fit_at(key: &KeyFrame, grid: &Grid, x: u32, y: u32) -> Fit {
-    let d = key.displacement.at(x, y);
-    if !(d[0].is_finite() && d[1].is_finite()) {
-        return Fit::default();
-    }
-    let has_depth = !key.depth.data().is_empty();
-    let depth = if has_depth { key.depth.at(x, y) } else { 0 };
-    let mut window = [Neighbour::default(); WINDOW];
-    let mut count = 0;
-    for down in (-REACH..=REACH).step_by(STEP as usize) {
-        let Some(row) = y.checked_add_signed(down).filter(|row| *row < grid.cells[1]) else {
-            continue;
-        };
-        for right in (-REACH..=REACH).step_by(STEP as usize) {
-            let Some(column) = x.checked_add_signed(right).filter(|c| *c < grid.cells[0]) else {
-                continue;
-            };
-            let d = key.displacement.at(column, row);
-            let is_on = !has_depth || is_same_surface(depth, key.depth.at(column, row));
-            if is_on && d[0].is_finite() && d[1].is_finite() {
-                window[count] = Neighbour { e: offset(grid, [x, y], [column, row]), d };
-                count += 1;
-            }
-        }
-    }
-    let window = &window[..count];
-    if count < MIN_CELLS {
-        return Fit::default();
+pub(super) fn fit_eight(
+    lattice: &Lattice,
+    row: usize,
+    column: usize,
+    step: [f32; 2],
+) -> [Fit; LANES] {
+    let middle = lattice.eight(row + MARGIN, column + MARGIN);
+    let window = Window::new(lattice, row, column);
+    let is_known = middle.is_known();
+    let zero = Lanes::default();
+    let d = both(|axis| middle.d[axis].or(&is_known, zero));
+    let mut count = zero;
+    // Mean distance of the window's motion from the middle's.
+    let mut spread = zero;
+    for (on, cell) in window.on.iter().zip(&window.d) {
+        count = count + *on;
+        spread = spread + *on * ((cell[0] - d[0]).abs() + (cell[1] - d[1]).abs());
     }
     // The middle's own motion first: what is near it in motion weighs most from the start, so that
     // of two objects the one in the middle wins.
-    let mut fit = Fit { depth, is_known: true, d, j: [[0.0; 2]; 2] };
-    let scale = spread(window, d);
+    let mut maps = Maps { d, j: [[zero; 2]; 2] };
+    let half = Lanes::all(HALF_WEIGHT_PX);
+    let mut is_fit = Lanes::all(MIN_POINTS - 0.5).is_below(count);
     for round in 0..ROUNDS {
-        let half = if round == 0 { HALF_WEIGHT_PX.max(scale) } else { HALF_WEIGHT_PX };
-        match solve(window, &fit, half, RIDGE * grid.step[0] * grid.step[1]) {
-            Some((d, j)) => (fit.d, fit.j) = (d, j),
-            None => return Fit::default(),
+        let half = if round == 0 { half.max(spread / count) } else { half };
+        let is_solved;
+        (maps, is_solved) = window.solve(&maps, half, RIDGE * step[0] * step[1]);
+        for (is_fit, is_solved) in is_fit.iter_mut().zip(is_solved) {
+            *is_fit &= is_solved;
         }
     }
-    fit
+    let mut fits = [Fit::default(); LANES];
+    for (lane, fit) in fits.iter_mut().enumerate() {
+        let j = both(|row| both(|column| maps.j[row][column].0[lane]));
+        if let Some(power) = Power::of(&j).filter(|_| is_fit[lane] && is_known[lane]) {
+            let d = both(|axis| maps.d[axis].0[lane]);
+            *fit = Fit { depth: middle.depth[lane], is_known: true, d, j, power };
+        }
+    }
+    fits
 }
 
-/// Mean distance of the window's motion from the middle's, pixels.
-#[expect(clippy::cast_precision_loss, reason = "at most 25 cells")]
-fn spread(window: &[Neighbour], d: [f32; 2]) -> f32 {
-    let sum: f32 =
-        window.iter().map(|cell| (cell.d[0] - d[0]).abs() + (cell.d[1] - d[1]).abs()).sum();
-    sum / window.len() as f32
-}
+impl Window {
+    #[inline(always)]
+    fn new(lattice: &Lattice, row: usize, column: usize) -> Self {
+        let middle = lattice.eight(row + MARGIN, column + MARGIN);
+        let here = lattice.columns(column + MARGIN);
+        let zero = Lanes::default();
+        let mut window = Self {
+            on: [zero; SIDE * SIDE],
+            d: [[zero; 2]; SIDE * SIDE],
+            right: [zero; SIDE],
+            down: [zero; SIDE],
+        };
+        for i in 0..SIDE {
+            window.right[i] = lattice.columns(column + i) - here;
+            window.down[i] = Lanes::all(lattice.row(row + i) - lattice.row(row + MARGIN));
+        }
+        for (i, (on, d)) in window.on.iter_mut().zip(&mut window.d).enumerate() {
+            let cells = lattice.eight(row + i / SIDE, column + i % SIDE);
+            let (is_known, is_on) = (cells.is_known(), cells.is_on(&middle));
+            let mut counts = [false; LANES];
+            for ((counts, is_known), is_on) in counts.iter_mut().zip(is_known).zip(is_on) {
+                *counts = is_known & is_on;
+            }
+            *on = Lanes::all(1.0).or(&counts, zero);
+            *d = [cells.d[0].or(&counts, zero), cells.d[1].or(&counts, zero)];
+        }
+        window
+    }
 
-/// (4) with the weights of the residuals of `fit`.
-fn solve(window: &[Neighbour], fit: &Fit, half: f32, ridge: f32) -> Option<([f32; 2], Matrix)> {
-    // Sums of w, w e, w e e^T, w d, w d e^T.
-    let (mut w, mut we, mut wd) = (0.0, [0.0; 2], [0.0; 2]);
-    let (mut wee, mut wde) = ([0.0; 3], [[0.0; 2]; 2]);
-    for Neighbour { e, d } in window {
-        let predicted = predict(fit, *e);
-        let (rx, ry) = (predicted[0] - d[0], predicted[1] - d[1]);
-        let weight = 1.0 / (1.0 + (rx * rx + ry * ry) / (half * half));
-        w += weight;
+    /// (4) with the weights of the residuals of `maps`, and where it has a solution.
+    #[inline(always)]
+    fn solve(&self, maps: &Maps, half: Lanes, ridge: f32) -> (Maps, [bool; LANES]) {
+        let zero = Lanes::default();
+        let (one, per_square) = (Lanes::all(1.0), Lanes::all(1.0) / (half * half));
+        // Sums of w, w e, w e e^T, w d, w d e^T.
+        let (mut w, mut we, mut wd) = (zero, [zero; 2], [zero; 2]);
+        let (mut wee, mut wde) = ([zero; 3], [[zero; 2]; 2]);
+        for (i, (on, d)) in self.on.iter().zip(&self.d).enumerate() {
+            let e = [self.right[i % SIDE], self.down[i / SIDE]];
+            let predicted = maps.predict(e);
+            let (rx, ry) = (predicted[0] - d[0], predicted[1] - d[1]);
+            let weight = *on / (one + (rx * rx + ry * ry) * per_square);
+            let weighted = [weight * e[0], weight * e[1]];
+            w = w + weight;
+            for axis in 0..2 {
+                we[axis] = we[axis] + weighted[axis];
+                wd[axis] = wd[axis] + weight * d[axis];
+                wde[axis][0] = wde[axis][0] + d[axis] * weighted[0];
+                wde[axis][1] = wde[axis][1] + d[axis] * weighted[1];
+            }
+            wee[0] = wee[0] + weighted[0] * e[0];
+            wee[1] = wee[1] + weighted[0] * e[1];
+            wee[2] = wee[2] + weighted[1] * e[1];
+        }
+        // About the weighted mean, where D0 and J part.
+        let per_w = one / w;
+        let (mean_e, mean_d) = ([we[0] * per_w, we[1] * per_w], [wd[0] * per_w, wd[1] * per_w]);
+        let ridge = Lanes::all(ridge);
+        let xx = wee[0] - we[0] * mean_e[0] + ridge;
+        let xy = wee[1] - we[0] * mean_e[1];
+        let yy = wee[2] - we[1] * mean_e[1] + ridge;
+        let det = xx * yy - xy * xy;
+        let per_det = one / det;
+        let mut maps = Maps { d: mean_d, j: [[zero; 2]; 2] };
         for axis in 0..2 {
-            we[axis] += weight * e[axis];
-            wd[axis] += weight * d[axis];
-            wde[axis][0] += weight * d[axis] * e[0];
-            wde[axis][1] += weight * d[axis] * e[1];
+            let x = wde[axis][0] - wd[axis] * mean_e[0];
+            let y = wde[axis][1] - wd[axis] * mean_e[1];
+            maps.j[axis] = [(x * yy - y * xy) * per_det, (y * xx - x * xy) * per_det];
+            maps.d[axis] = mean_d[axis] - maps.j[axis][0] * mean_e[0] - maps.j[axis][1] * mean_e[1];
         }
-        wee[0] += weight * e[0] * e[0];
-        wee[1] += weight * e[0] * e[1];
-        wee[2] += weight * e[1] * e[1];
+        let (is_weighty, is_regular) = (Lanes::all(1.0).is_below(w), zero.is_below(det));
+        let mut is_solved = [false; LANES];
+        for ((is_solved, a), b) in is_solved.iter_mut().zip(is_weighty).zip(is_regular) {
+            *is_solved = a & b;
+        }
+        (maps, is_solved)
     }
-    if w < 1.0 {
-        return None;
-    }
-    // About the weighted mean, where D0 and J part.
-    let (mean_e, mean_d) = (we.map(|e| e / w), wd.map(|d| d / w));
-    let xx = wee[0] - we[0] * mean_e[0] + ridge;
-    let xy = wee[1] - we[0] * mean_e[1];
-    let yy = wee[2] - we[1] * mean_e[1] + ridge;
-    let det = xx * yy - xy * xy;
-    if det.is_nan() || det <= 0.0 {
-        return None;
-    }
-    let j = [0, 1].map(|axis| {
-        let x = wde[axis][0] - wd[axis] * mean_e[0];
-        let y = wde[axis][1] - wd[axis] * mean_e[1];
-        [(x * yy - y * xy) / det, (y * xx - x * xy) / det]
-    });
-    let d0 = [0, 1].map(|axis| mean_d[axis] - j[axis][0] * mean_e[0] - j[axis][1] * mean_e[1]);
-    Some((d0, j))
 }

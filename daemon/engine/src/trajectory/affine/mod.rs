@@ -18,12 +18,14 @@
 //! wheel keeps to its circle. (2): the square root of a 2x2 matrix, by Cayley and Hamilton; it needs
 //! nothing but square roots, which IEEE 754 fixes to the bit.
 //!
-//! [`fit`] finds J on a lattice of cells; each cell takes the mean of those around it that
-//! predict its own motion.
+//! Both are linear in D, so that what J makes of it is worked out once per lattice point: [`fit`]
+//! finds J there, eight points at a time and only where it is wanted; each cell takes the mean of
+//! those around it that predict its own motion ([`field`]).
 
+mod field;
 mod fit;
 mod power;
 #[cfg(test)]
 mod tests;
 
-pub use fit::AffineField;
+pub use field::AffineField;

@@ -1,11 +1,12 @@
 //! Laws of the affine rung.
 
-use super::power::continued;
+use super::power::{Matrix, Power};
 use super::*;
 use crate::key::KeyFrame;
 use crate::plane::Rect;
 use crate::testing::{plane, pool};
 use crate::trajectory::grid::Grid;
+use crate::trajectory::lattice::Lattice;
 
 /// The place after turning by `angle` about (60, 44) and growing by `zoom`.
 fn turned(at: [f32; 2], angle: f32, zoom: f32) -> [f32; 2] {
@@ -32,13 +33,21 @@ fn disc(angle: f32, zoom: f32) -> KeyFrame {
     }
 }
 
+/// The fits of all of a key's field.
+fn fitted(threads: usize, key: &KeyFrame, grid: &Grid) -> AffineField {
+    let (mut lattice, mut field) = (Lattice::default(), AffineField::default());
+    lattice.update(&pool(threads), key, grid);
+    field.clear(&lattice);
+    field.fit(&pool(threads), &lattice, grid, |_, _| true);
+    field
+}
+
 #[test]
 fn a_turning_and_growing_disc_goes_on_turning_and_growing() {
     for (angle, zoom) in [(0.1, 1.0), (0.6, 1.0), (-0.4, 1.1), (0.0, 0.8)] {
         let key = disc(angle, zoom);
         let grid = Grid::of(&key);
-        let mut field = AffineField::default();
-        field.update(&pool(2), &key, &grid);
+        let field = fitted(2, &key, &grid);
         for (x, y) in [(60, 44), (80, 40), (40, 60), (60, 12)] {
             let at = [x as f32, y as f32];
             let curve = field.curve(&key, &grid, x, y).unwrap();
@@ -66,8 +75,7 @@ fn a_uniform_motion_stays_a_straight_line() {
         ..KeyFrame::default()
     };
     let grid = Grid::of(&key);
-    let mut field = AffineField::default();
-    field.update(&pool(1), &key, &grid);
+    let field = fitted(1, &key, &grid);
     let curve = field.curve(&key, &grid, 15, 9).unwrap();
     let expected = [2.5, -1.0, 5.0, -2.0];
     for (found, expected) in curve.half.into_iter().chain(curve.one).zip(expected) {
@@ -77,12 +85,12 @@ fn a_uniform_motion_stays_a_straight_line() {
 
 #[test]
 fn a_mirror_a_collapse_and_half_a_turn_have_no_power() {
-    let d = [1.0, 0.0];
-    assert!(continued(d, &[[0.0, 0.0], [0.0, 0.0]]).is_some());
-    assert_eq!(continued(d, &[[2.0, 0.0], [0.0, 0.0]]), None, "a mirror");
-    assert_eq!(continued(d, &[[1.0, 0.0], [0.0, 1.0]]), None, "a collapse");
-    assert_eq!(continued(d, &[[2.0, 0.0], [0.0, 2.0]]), None, "half a turn");
-    assert_eq!(continued([f32::NAN, 0.0], &[[f32::NAN; 2]; 2]), None);
+    let power = |j: Matrix| Power::of(&j);
+    assert!(power([[0.0, 0.0], [0.0, 0.0]]).is_some());
+    assert_eq!(power([[2.0, 0.0], [0.0, 0.0]]), None, "a mirror");
+    assert_eq!(power([[1.0, 0.0], [0.0, 1.0]]), None, "a collapse");
+    assert_eq!(power([[2.0, 0.0], [0.0, 2.0]]), None, "half a turn");
+    assert_eq!(power([[f32::NAN; 2]; 2]), None);
 }
 
 #[test]
@@ -91,7 +99,6 @@ fn a_patch_too_small_for_a_fit_has_none() {
     key.displacement =
         plane(120, 88, |x, y| if (x, y) == (62, 46) { [3.0, 0.0] } else { [f32::NAN; 2] });
     let grid = Grid::of(&key);
-    let mut field = AffineField::default();
-    field.update(&pool(1), &key, &grid);
+    let field = fitted(1, &key, &grid);
     assert_eq!(field.curve(&key, &grid, 62, 46), None);
 }

@@ -97,12 +97,14 @@ impl Reprojection {
     #[must_use]
     #[inline(always)]
     pub fn scaled(&self, at: [f32; 2], q: f32) -> [f32; 3] {
-        self.homogeneous(at, q).map(|h| h / q)
+        let [x, y, w] = self.homogeneous(at, q);
+        [x / q, y / q, w / q]
     }
 
     #[inline(always)]
     fn homogeneous(&self, [x, y]: [f32; 2], q: f32) -> [f32; 3] {
-        self.rows.map(|row| row.x * x + row.y * y + row.z + row.w * q)
+        let part = |row: &Vec4| row.x * x + row.y * y + row.z + row.w * q;
+        [part(&self.rows[0]), part(&self.rows[1]), part(&self.rows[2])]
     }
 }
 

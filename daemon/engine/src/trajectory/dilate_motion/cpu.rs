@@ -127,9 +127,10 @@ fn dilate_row(centres: &[u32], [above, here, below]: [&RowMaxima; 3], velocities
     }
 }
 
-/// (3) and (4) for a row.
+/// (3) and (4) for a row of cells. `px_per_span` is pixels per span of a speed of one degree per
+/// second, where motion is damped.
 #[inline(always)]
-fn quantise_row(displacement: &[[f32; 2]], px_per_span: Option<f32>, row: &mut [Velocity]) {
+pub fn quantise_row(displacement: &[[f32; 2]], px_per_span: Option<f32>, row: &mut [Velocity]) {
     let cells = row.iter_mut().zip(displacement);
     // A loop of its own without damping, which has no call in it.
     if px_per_span.is_none() {

@@ -25,7 +25,7 @@ mod cpu;
 
 use crate::time::MonoSpan;
 
-pub use cpu::{dilate_cells, dilate_depth_row, dilate_motion};
+pub use cpu::{dilate_cells, dilate_depth_row, dilate_motion, quantise_row};
 
 /// Largest displacement that a velocity holds, pixels per span.
 pub const MAX_DISPLACEMENT_PX: f32 = 1023.0;
