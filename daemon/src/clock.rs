@@ -26,6 +26,21 @@ pub fn now() -> MonoTime {
     MonoTime::from_ns(time.tv_sec.unsigned_abs() * NS_PER_S + time.tv_nsec.unsigned_abs())
 }
 
+/// The instant at which the clock of the kernel with number `id` showed `time_ns`, by both clocks as
+/// they are now; None for clocks that a presentation time is never told in.
+#[must_use]
+pub fn from_other_clock(id: u32, time_ns: u64) -> Option<MonoTime> {
+    let other = match id {
+        1 => return Some(MonoTime::from_ns(time_ns)),
+        4 => ClockId::MonotonicRaw,
+        _ => return None,
+    };
+    let time = clock_gettime(other);
+    let shown = time.tv_sec.unsigned_abs() * NS_PER_S + time.tv_nsec.unsigned_abs();
+    let ago = MonoTime::from_ns(shown) - MonoTime::from_ns(time_ns);
+    Some(now() - ago)
+}
+
 /// Sleeps until `deadline`; returns at once when it has passed.
 pub fn sleep_until(deadline: MonoTime) {
     let request = timespec(deadline);
@@ -124,6 +139,17 @@ mod tests {
     use foreframe_engine::MonoSpan;
 
     use super::*;
+
+    #[test]
+    fn another_clock_is_told_by_how_long_ago_it_was() {
+        let raw = clock_gettime(ClockId::MonotonicRaw);
+        let raw_ns = raw.tv_sec.unsigned_abs() * NS_PER_S + raw.tv_nsec.unsigned_abs();
+        let before = from_other_clock(4, raw_ns - 5_000_000).unwrap();
+        let ago = now() - before;
+        assert!(ago >= MonoSpan::from_us(4_990) && ago < MonoSpan::from_ms(60_000), "{ago}");
+        assert_eq!(from_other_clock(1, 77), Some(MonoTime::from_ns(77)));
+        assert_eq!(from_other_clock(0, 77), None);
+    }
 
     #[test]
     fn a_wait_never_ends_before_its_deadline() {

@@ -16,6 +16,8 @@ use foreframe_engine::{Method, MonoSpan};
 use serde::{Deserialize, Deserializer};
 use tracing_subscriber::EnvFilter;
 
+use crate::sink::window::WindowOptions;
+
 /// Arguments of `foreframed` and of `foreframe serve`.
 #[derive(clap::Args, Deserialize, Clone, Debug, Default)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
@@ -24,11 +26,18 @@ pub struct Args {
     /// Socket to listen on [default: foreframe/daemon.sock in XDG_RUNTIME_DIR]
     #[arg(long, value_name = "PATH")]
     pub socket: Option<PathBuf>,
-    /// Where output frames go: null, shm, png:DIR, y4m:PATH, or - for y4m on standard output
+    /// Where output frames go: window, null, shm, png:DIR, y4m:PATH, or - for y4m on standard output
     /// [default: shm]
     #[arg(long)]
     pub sink: Option<SinkSpec>,
-    /// Refresh rate of the output, 1 to 1000 [default: 120]
+    /// Windows are as large as the monitor
+    #[arg(long)]
+    #[serde(default)]
+    pub fullscreen: bool,
+    /// Monitor for windows, by its name; one that is not full screen opens there on X11 alone
+    #[arg(long, value_name = "NAME")]
+    pub monitor: Option<String>,
+    /// Refresh rate of the output, 1 to 1000; a window has its display's [default: 120]
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub refresh: Option<f64>,
     /// What makes the pictures: auto, cpu, gpu or gpu:NAME; `foreframe adapters` says what auto takes
@@ -80,13 +89,15 @@ pub enum SinkSpec {
     Y4m(PathBuf),
     /// A y4m stream on standard output.
     Y4mStdout,
+    /// A window of each stream, paced by what the display says. Subscribers get frames too.
+    Window,
 }
 
 impl SinkSpec {
     /// Whether frames reach a file or a pipe, so that a copy of them is worth its price.
     #[must_use]
     pub fn keeps_frames(&self) -> bool {
-        !matches!(self, Self::Null | Self::Shm)
+        !matches!(self, Self::Null | Self::Shm | Self::Window)
     }
 }
 
@@ -101,7 +112,8 @@ impl FromStr for SinkSpec {
             None if spec == "null" => Ok(Self::Null),
             None if spec == "shm" => Ok(Self::Shm),
             None if spec == "-" => Ok(Self::Y4mStdout),
-            _ => Err(format!("expected null, shm, png:DIR, y4m:PATH or -, found `{spec}`")),
+            None if spec == "window" => Ok(Self::Window),
+            _ => Err(format!("expected window, null, shm, png:DIR, y4m:PATH or -, found `{spec}`")),
         }
     }
 }
@@ -114,6 +126,7 @@ impl fmt::Display for SinkSpec {
             Self::Png(dir) => write!(f, "png:{}", dir.display()),
             Self::Y4m(path) => write!(f, "y4m:{}", path.display()),
             Self::Y4mStdout => f.write_str("-"),
+            Self::Window => f.write_str("window"),
         }
     }
 }
@@ -159,7 +172,9 @@ pub struct Config {
     pub socket: Option<PathBuf>,
     /// Where output frames go.
     pub sink: SinkSpec,
-    /// Period of the output.
+    /// How windows open.
+    pub window: WindowOptions,
+    /// Period of the output, except of windows.
     pub refresh_interval: MonoSpan,
     /// What makes the pictures.
     pub backend: BackendChoice,
@@ -207,6 +222,8 @@ impl Args {
         Self {
             socket: self.socket.or(file.socket),
             sink: self.sink.or(file.sink),
+            fullscreen: self.fullscreen || file.fullscreen,
+            monitor: self.monitor.or(file.monitor),
             refresh: self.refresh.or(file.refresh),
             backend: self.backend.or(file.backend),
             method: self.method.or(file.method),
@@ -246,6 +263,7 @@ impl Args {
         Ok(Config {
             socket: self.socket,
             sink: self.sink.unwrap_or_default(),
+            window: WindowOptions { is_fullscreen: self.fullscreen, monitor: self.monitor },
             refresh_interval: MonoSpan::from_hz(refresh),
             backend: self.backend.unwrap_or(BackendChoice::Auto),
             method: self.method.unwrap_or_default(),
@@ -297,9 +315,11 @@ mod tests {
     }
 
     /// Every option with a value that is not its default, by the name that flag and file share.
-    const EVERY_OPTION: [(&str, &str, &str); 11] = [
+    const EVERY_OPTION: [(&str, &str, &str); 13] = [
         ("socket", "/run/x", "'/run/x'"),
         ("sink", "png:out", "'png:out'"),
+        ("fullscreen", "", "true"),
+        ("monitor", "DP-1", "'DP-1'"),
         ("refresh", "144", "144"),
         ("backend", "cpu", "'cpu'"),
         ("method", "hold", "'hold'"),
@@ -367,10 +387,10 @@ mod tests {
 
     #[test]
     fn sinks_read_back_what_they_print() {
-        for spec in ["null", "shm", "png:a/b", "y4m:x.y4m", "-"] {
+        for spec in ["null", "shm", "png:a/b", "y4m:x.y4m", "-", "window"] {
             assert_eq!(spec.parse::<SinkSpec>().unwrap().to_string(), spec);
         }
-        for spec in ["", "png", "png:", "y4m:", "window", "shm:x"] {
+        for spec in ["", "png", "png:", "y4m:", "window:x", "shm:x"] {
             let error = spec.parse::<SinkSpec>().unwrap_err();
             assert!(error.contains(&format!("found `{spec}`")), "{error}");
         }

@@ -39,6 +39,7 @@ use crate::recorder::Recorder;
 use crate::session::Session;
 use crate::session::handshake::Terms;
 use crate::sink;
+use crate::sink::window::WindowSystem;
 use crate::stream::FromStream;
 use crate::stream::allocator::Allocator;
 use crate::stream::reaper::Reaper;
@@ -87,6 +88,8 @@ struct Server {
     reaper: Reaper,
     allocator: Allocator,
     recorder: Option<Recorder>,
+    /// The desktop, if streams are shown in windows.
+    windows: Option<WindowSystem>,
 }
 
 impl Daemon {
@@ -97,6 +100,10 @@ impl Daemon {
     /// be used, or a file cannot be made.
     pub fn bind(config: Config) -> anyhow::Result<Self> {
         sink::prepare(&config.sink)?;
+        let windows = match config.sink {
+            SinkSpec::Window => Some(WindowSystem::start(&config.window).context("--sink window")?),
+            _ => None,
+        };
         let gpus = Gpus::find(config.backend.clone()).context("--backend")?;
         let path = match &config.socket {
             Some(path) => path.clone(),
@@ -144,6 +151,7 @@ impl Daemon {
             reaper,
             allocator,
             recorder,
+            windows,
         };
 
         info!(socket = %listener.path().display(), "listening");

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 
 use anyhow::Context as _;
-use foreframe_engine::EngineConfig;
+use foreframe_engine::{EngineConfig, StreamFormat as EngineFormat};
 use foreframe_protocol::memory::ReadOnlyPool;
 use foreframe_protocol::{
     CreateStream, EndReason, ErrorCode, OutputFrame, Pacing, Presented, ReleaseReason,
@@ -17,6 +17,7 @@ use crate::clock::{self, Waker};
 use crate::ingest::{self, KeyOrder};
 use crate::session::fault::Fault;
 use crate::sink::Sink;
+use crate::sink::window::{WindowConfig, WindowOpener, WindowSystem};
 use crate::sink::worker::SinkWorker;
 use crate::stream::core::CoreConfig;
 use crate::stream::mailbox::Mailbox;
@@ -111,6 +112,7 @@ impl Server {
             mailbox: Arc::clone(&mailbox),
             events: self.events.clone(),
             sink,
+            window: self.window(&format, ordinal),
             recorder: self.recorder.as_ref().map(|it| it.stream(number_in_file)),
         })
         .context("starting the stream's thread")?;
@@ -131,6 +133,13 @@ impl Server {
             },
         );
         Ok(ordinal)
+    }
+
+    /// What a stream opens its window with, if the daemon shows windows.
+    fn window(&self, format: &EngineFormat, ordinal: u64) -> Option<(WindowOpener, WindowConfig)> {
+        let opener = self.windows.as_ref().map(WindowSystem::opener)?;
+        let title = format!("Foreframe {}", ordinal + 1);
+        Some((opener, WindowConfig { format: *format, title }))
     }
 
     /// Passes on what a stream's thread tells.

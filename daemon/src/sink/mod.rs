@@ -3,10 +3,12 @@
 //! [`Sink`] takes frames in and does nothing else: no thread, no clock. Deterministic replay drives
 //! it directly. The daemon puts the slow ones behind a [`worker`] with a bounded queue, so that a
 //! slow disk costs frames in the file and never a frame on the display. Subscribers are served by
-//! the stream itself: a frame for them is a copy into shared memory, not a write.
+//! the stream itself: a frame for them is a copy into shared memory, not a write. A [`window`] is more
+//! than a sink: it says when it showed what, and the stream is paced by that.
 
 pub mod png;
 pub mod srgb;
+pub mod window;
 pub mod worker;
 pub mod y4m;
 
@@ -54,7 +56,7 @@ impl Sink {
         ordinal: u64,
     ) -> io::Result<Self> {
         let out: Box<dyn Write + Send> = match spec {
-            SinkSpec::Null | SinkSpec::Shm => return Ok(Self::Null),
+            SinkSpec::Null | SinkSpec::Shm | SinkSpec::Window => return Ok(Self::Null),
             SinkSpec::Png(dir) => {
                 return PngSink::create(&beside(dir, ordinal), format).map(Self::Png);
             }
@@ -93,13 +95,13 @@ impl Sink {
 }
 
 /// Looks whether the place that `spec` names can take frames, and makes its folder. Opens nothing:
-/// to open a pipe waits for its reader.
+/// to open a pipe waits for its reader. Windows are looked for by who starts their thread.
 ///
 /// # Errors
 /// What was expected and what was found.
 pub fn prepare(spec: &SinkSpec) -> io::Result<()> {
     match spec {
-        SinkSpec::Null | SinkSpec::Shm | SinkSpec::Y4mStdout => Ok(()),
+        SinkSpec::Null | SinkSpec::Shm | SinkSpec::Y4mStdout | SinkSpec::Window => Ok(()),
         SinkSpec::Png(dir) => {
             let made = fs::create_dir_all(dir).and_then(|()| is_writable(dir));
             made.map_err(|error| wrong(spec, "a folder for pictures", &error))

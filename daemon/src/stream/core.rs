@@ -4,6 +4,7 @@
 //! it. [`super::thread`] waits and carries things to and fro; nothing here waits, sends or reads a
 //! clock other than the one it is given.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use foreframe_engine::backend::BackendStatus;
@@ -100,13 +101,50 @@ pub struct FrameCounts {
     pub dropped: u64,
 }
 
+/// Where pictures are shown.
+#[derive(Clone, Copy, Debug)]
+enum Display {
+    /// Nowhere: refreshes are instants on a grid, and each shows what is ready by then.
+    Timer(TimerDisplay),
+    /// On a display that tells when it showed them.
+    Told,
+}
+
+/// Pictures under way at most; a display that answers nothing is not waited for.
+const UNDER_WAY: usize = 64;
+
+/// What a display tells.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Told {
+    /// The picture planned for `planned` was shown at `presented_at`, which was heard at `heard_at`.
+    Presented {
+        /// As planned.
+        planned: MonoTime,
+        /// As shown.
+        presented_at: MonoTime,
+        /// When it said so.
+        heard_at: MonoTime,
+    },
+    /// The picture planned for `planned` was never shown.
+    Discarded {
+        /// As planned.
+        planned: MonoTime,
+    },
+    /// It announces another refresh interval.
+    Mode(MonoSpan),
+    /// Whether anybody can see it.
+    Visible(bool),
+}
+
 /// Engine, pacer and display of one stream.
 #[derive(Debug)]
 pub struct StreamCore {
     engine: Engine,
     method: Method,
     pacer: Pacer,
-    display: TimerDisplay,
+    display: Display,
+    /// Pictures that were handed to a display that will tell what became of them, oldest first.
+    under_way: VecDeque<(MonoTime, FrameKind)>,
     frame: ColorPlane,
     counts: FrameCounts,
     newest_key: Option<NewestKey>,
@@ -127,13 +165,23 @@ struct NewestKey {
     taken: u64,
 }
 
+fn new_pacer(method: Method, refresh_interval: MonoSpan, known_refresh: Option<MonoTime>) -> Pacer {
+    Pacer::new(PacerConfig {
+        refresh_interval,
+        refresh: RefreshKind::Fixed,
+        known_refresh,
+        interpolates: method.interpolates(),
+        work: WorkEstimate::Measured { first: refresh_interval.scale(1, 4) },
+    })
+}
+
 /// The picture on the display.
 #[derive(Clone, Copy, Debug)]
 struct Shown {
     index: u64,
     presented_at: MonoTime,
     content_time: MonoTime,
-    /// Keys taken in when it was made.
+    /// Keys taken in when it was made. 0 if the display never showed it.
     keys: u64,
 }
 
@@ -141,18 +189,14 @@ impl StreamCore {
     /// A stream without keys.
     #[must_use]
     pub fn new(format: StreamFormat, config: &CoreConfig) -> Self {
-        let pacer = Pacer::new(PacerConfig {
-            refresh_interval: config.refresh_interval,
-            refresh: RefreshKind::Fixed,
-            known_refresh: Some(config.display_origin),
-            interpolates: config.engine.method.interpolates(),
-            work: WorkEstimate::Measured { first: config.refresh_interval.scale(1, 4) },
-        });
+        let CoreConfig { refresh_interval, display_origin, .. } = *config;
+        let pacer = new_pacer(config.engine.method, refresh_interval, Some(display_origin));
         Self {
             engine: Engine::new(format, config.engine),
             method: config.engine.method,
             pacer,
-            display: TimerDisplay::new(config.display_origin, config.refresh_interval),
+            display: Display::Timer(TimerDisplay::new(display_origin, refresh_interval)),
+            under_way: VecDeque::new(),
             frame: ColorPlane::new(format.color, format.width, format.height),
             counts: FrameCounts::default(),
             newest_key: None,
@@ -164,6 +208,31 @@ impl StreamCore {
     /// Makes the pictures on `gpu`, in a stream that has had no key.
     pub fn use_gpu(&mut self, gpu: &Arc<Gpu>) {
         self.engine.use_gpu(gpu);
+    }
+
+    /// Shows the pictures on a display that tells when it showed them, in a stream that has had no
+    /// key. `announced` is its refresh interval, if it names one.
+    pub fn use_display(&mut self, announced: Option<MonoSpan>) {
+        let refresh_interval = announced.unwrap_or(self.interval());
+        self.pacer = new_pacer(self.method, refresh_interval, None);
+        self.display = Display::Told;
+    }
+
+    /// Shows the pictures on a timer of this interval, in a stream that has had no key.
+    pub fn use_timer(&mut self, refresh_interval: MonoSpan, origin: MonoTime) {
+        self.pacer = new_pacer(self.method, refresh_interval, Some(origin));
+        self.display = Display::Timer(TimerDisplay::new(origin, refresh_interval));
+    }
+
+    /// The display is gone: back to a timer, on a grid from `now`, for who else gets pictures.
+    pub fn leave_display(&mut self, now: MonoTime) {
+        let refresh_interval = self.interval();
+        self.display = Display::Timer(TimerDisplay::new(now, refresh_interval));
+        self.pacer.on_mode(refresh_interval, RefreshKind::Fixed);
+        self.pacer.on_visibility(true);
+        self.pacer.on_presented(now, now, now);
+        self.under_way.clear();
+        self.counted_until = self.counted_until.map(|_| now);
     }
 
     /// What makes the pictures.
@@ -222,7 +291,9 @@ impl StreamCore {
             .shown
             .is_some_and(|shown| (shown.content_time, shown.keys) == (content_time, key.taken));
         if is_shown_already {
-            self.pacer.on_presented(plan.present_at, plan.present_at, plan.present_at);
+            if let Display::Timer(_) = self.display {
+                self.pacer.on_presented(plan.present_at, plan.present_at, plan.present_at);
+            }
             self.count_until(plan.present_at);
             return Some(FrameOutcome::Repeated);
         }
@@ -231,8 +302,12 @@ impl StreamCore {
         let ready_at = clock();
         self.pacer.on_work(ready_at - plan.wake_at.min(started_at));
         let kind = self.kind(content_time, report.phase, &key);
-        let presented_at = self.display.refresh_at_or_after(ready_at);
-        self.count_until(plan.present_at - self.display.interval());
+        let presented_at = match self.display {
+            Display::Timer(timer) => timer.refresh_at_or_after(ready_at),
+            // Late for the deadline as it is known is not late for sure.
+            Display::Told => ready_at.max(plan.present_at),
+        };
+        self.count_until(plan.present_at - self.interval());
         self.counted_until = Some(plan.present_at);
         if presented_at > plan.present_at {
             self.pacer.on_dropped();
@@ -241,7 +316,17 @@ impl StreamCore {
         }
         // Ready early: the display still shows it at the refresh that it was planned for.
         let presented_at = plan.present_at;
-        self.pacer.on_presented(plan.present_at, presented_at, presented_at);
+        match self.display {
+            Display::Timer(_) => {
+                self.pacer.on_presented(plan.present_at, presented_at, presented_at);
+            }
+            Display::Told => {
+                if self.under_way.len() == UNDER_WAY {
+                    self.under_way.pop_front();
+                }
+                self.under_way.push_back((plan.present_at, kind));
+            }
+        }
         match kind {
             FrameKind::Real => self.counts.real += 1,
             FrameKind::Synthesised => self.counts.synthesised += 1,
@@ -265,11 +350,65 @@ impl StreamCore {
         }))
     }
 
+    /// The picture of `plan` was handed to the display at `now`, or was not taken.
+    pub fn on_handed_over(&mut self, plan: &Plan, now: MonoTime, is_taken: bool) {
+        match (self.display, is_taken) {
+            (Display::Timer(_), true) => {}
+            (Display::Told, true) => self.pacer.on_handed_over(plan, now),
+            (_, false) => {
+                self.pacer.on_dropped();
+                self.count_discarded(plan.present_at);
+            }
+        }
+    }
+
+    /// A display that tells has told.
+    pub fn on_told(&mut self, told: Told) {
+        match told {
+            Told::Presented { planned, presented_at, heard_at } => {
+                self.under_way.retain(|&(waiting, _)| waiting > planned);
+                self.pacer.on_presented(planned, presented_at, heard_at);
+            }
+            Told::Discarded { planned } => {
+                self.count_discarded(planned);
+                self.pacer.on_discarded(planned);
+            }
+            Told::Mode(refresh_interval) => {
+                self.pacer.on_mode(refresh_interval, RefreshKind::Fixed);
+                if let Display::Timer(timer) = &mut self.display {
+                    let origin = self.counted_until.unwrap_or_default();
+                    *timer = TimerDisplay::new(origin, refresh_interval);
+                    self.pacer.on_presented(origin, origin, origin);
+                }
+            }
+            Told::Visible(is_visible) => self.pacer.on_visibility(is_visible),
+        }
+    }
+
+    /// The picture for `planned` was counted as shown, and was not.
+    fn count_discarded(&mut self, planned: MonoTime) {
+        // What was made for it is not on the display, and is worth another try.
+        self.shown = self.shown.map(|shown| match shown.presented_at == planned {
+            true => Shown { keys: 0, ..shown },
+            false => shown,
+        });
+        let position = self.under_way.iter().position(|&(waiting, _)| waiting == planned);
+        let Some((_, kind)) = position.and_then(|position| self.under_way.remove(position)) else {
+            return;
+        };
+        match kind {
+            FrameKind::Real => self.counts.real -= 1,
+            FrameKind::Synthesised => self.counts.synthesised -= 1,
+        }
+        self.counts.dropped += 1;
+    }
+
     /// The stream ends at `now`: what the display has shown until then is counted.
     pub fn finish(&mut self, now: MonoTime) {
+        let Display::Timer(timer) = self.display else { return };
         // The refresh at or after a time is the last one at or before it, or one too late.
-        let next = self.display.refresh_at_or_after(now);
-        let last = if next > now { next - self.display.interval() } else { next };
+        let next = timer.refresh_at_or_after(now);
+        let last = if next > now { next - timer.interval() } else { next };
         self.count_until(last);
     }
 
@@ -300,7 +439,7 @@ impl StreamCore {
     /// Counts the refreshes after the last counted one, up to the one at `last`, as repeated.
     fn count_until(&mut self, last: MonoTime) {
         let Some(counted) = self.counted_until else { return };
-        if last - counted > self.display.interval().scale(1, 2) {
+        if last - counted > self.interval().scale(1, 2) {
             self.counts.repeated += self.refreshes(last - counted);
             self.counted_until = Some(last);
         }
@@ -320,9 +459,17 @@ impl StreamCore {
         if is_of_a_key { FrameKind::Real } else { FrameKind::Synthesised }
     }
 
+    /// Time between two refreshes, as it is known.
+    fn interval(&self) -> MonoSpan {
+        match self.display {
+            Display::Timer(timer) => timer.interval(),
+            Display::Told => self.pacer.status().refresh_interval,
+        }
+    }
+
     /// How many refreshes a span covers, at least one.
     fn refreshes(&self, span: MonoSpan) -> u64 {
-        let interval = self.display.interval().as_ns();
+        let interval = self.interval().as_ns().max(1);
         let rounded = (span.as_ns() + interval / 2) / interval;
         rounded.max(1).unsigned_abs()
     }

@@ -3,11 +3,12 @@
 //! The main loop [`start`](thread::start)s a stream, puts checked submissions into its [`mailbox`],
 //! and hears of everything else through [`StreamEvent`]s. The [`thread`] copies planes out of the
 //! pool ([`planes`]), drives the [`core`], and hands pictures to subscribers ([`outlet`]), to a
-//! sink and key frames to the recorder. Whatever is slow to drop goes to the [`reaper`], and pools
+//! sink, to the window ([`display`]) and key frames to the recorder. Whatever is slow to drop goes to the [`reaper`], and pools
 //! for subscribers come from the [`allocator`].
 
 pub mod allocator;
 pub mod core;
+mod display;
 pub mod mailbox;
 pub mod outlet;
 pub mod planes;

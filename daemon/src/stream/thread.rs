@@ -23,6 +23,7 @@ use thread_priority::{
 use tracing::{debug, error, info, trace, warn};
 
 use super::core::{CoreConfig, DroppedFrame, FrameKind, FrameOutcome, PresentedFrame, StreamCore};
+use super::display::WindowDisplay;
 use super::mailbox::{Mailbox, Submission, Taken};
 use super::planes::{PlaneCopier, SlotPlanes};
 use super::{FromStream, StreamEvent};
@@ -30,6 +31,7 @@ use crate::clock::{self, Alarm, Woken};
 use crate::gpu::Gpus;
 use crate::ingest::{self, IngestError, PlaneSource};
 use crate::recorder::StreamRecorder;
+use crate::sink::window::{WindowConfig, WindowOpener};
 use crate::sink::worker::SinkWorker;
 
 /// Refreshes in a row with nothing new to show, after which the thread waits for the next key
@@ -57,6 +59,8 @@ pub struct StreamParts {
     pub events: Sender<FromStream>,
     /// A sink that keeps frames, if there is one.
     pub sink: Option<SinkWorker>,
+    /// The window to show pictures in, if there is to be one.
+    pub window: Option<(WindowOpener, WindowConfig)>,
     /// Takes keys, if the daemon records.
     pub recorder: Option<StreamRecorder>,
 }
@@ -92,6 +96,7 @@ impl Drop for LastWords {
 struct StreamThread {
     parts: StreamParts,
     core: StreamCore,
+    window: Option<WindowDisplay>,
     copier: PlaneCopier,
     /// The newest key, until the first picture made from it is shown.
     unshown: Option<Unshown>,
@@ -131,9 +136,14 @@ impl StreamThread {
             }
         }
         info!(stream = parts.ordinal, backend = core.backend().name, "stream starts");
+        let window = parts.window.as_ref().and_then(|(opener, config)| {
+            let mailbox = Arc::clone(&parts.mailbox);
+            WindowDisplay::open(opener, config, &mut core, move || mailbox.waker.wake())
+        });
         Self {
             parts,
             core,
+            window,
             copier: PlaneCopier::default(),
             unshown: None,
             owes_picture: false,
@@ -161,6 +171,7 @@ impl StreamThread {
                 }
                 Taken::Nothing => {}
             }
+            self.hear_window();
             let plan = self.core.plan(clock::now());
             let is_idle =
                 plan.content_time.is_none() || self.repeats_in_a_row >= REPEATS_BEFORE_IDLE;
@@ -266,12 +277,27 @@ impl StreamThread {
             FrameOutcome::Presented(frame) => {
                 trace!(?frame, "frame presented");
                 self.repeats_in_a_row = 0;
+                if let Some(window) = &mut self.window {
+                    window.show(plan, &mut self.core);
+                }
                 self.deliver(&frame);
             }
         }
         if self.statistics_due_at <= plan.present_at {
             self.statistics_due_at = plan.present_at + STATISTICS_INTERVAL;
             self.send_statistics();
+        }
+    }
+
+    /// Takes in what the window has told, and what it told of keys that were shown.
+    fn hear_window(&mut self) {
+        let Some(window) = &mut self.window else { return };
+        let is_open = window.hear(&mut self.core);
+        for presented in window.take_shown() {
+            self.send(StreamEvent::Presented(presented));
+        }
+        if !is_open {
+            self.window = None;
         }
     }
 
@@ -316,7 +342,7 @@ impl StreamThread {
             sink.offer(frame.index, self.core.frame());
         }
         if let Some(key) = self.unshown.take_if(|key| key.key_index == frame.key_index) {
-            self.send(StreamEvent::Presented(Presented {
+            let presented = Presented {
                 stream: 0,
                 phase_q12,
                 key_index: key.key_index,
@@ -324,7 +350,11 @@ impl StreamThread {
                 received_at_ns: key.received_at_ns,
                 present_at_ns: frame.present_at.as_ns(),
                 presented_at_ns: frame.presented_at.as_ns(),
-            }));
+            };
+            match &mut self.window {
+                Some(window) => window.await_word_of(presented),
+                None => self.send(StreamEvent::Presented(presented)),
+            }
         }
     }
 

@@ -6,6 +6,7 @@ use foreframe_engine::Method;
 use foreframe_engine::backend::choice::BackendChoice;
 use foreframe_fixtures::{SceneInfo, Size};
 use foreframed::config::SinkSpec;
+use foreframed::sink::window::WindowOptions;
 
 use crate::demo::{self, Settings};
 use crate::options::{number, parse_scene};
@@ -32,7 +33,7 @@ pub struct Args {
     #[arg(long, value_name = "HZ", default_value_t = 40.0, value_parser = number(10.0, 240.0))]
     #[arg(allow_negative_numbers = true)]
     pub key_rate: f64,
-    /// Refreshes per second, 10 to 480
+    /// Refreshes per second, 10 to 480; a window has its display's
     #[arg(long, value_name = "HZ", default_value_t = 120.0, value_parser = number(10.0, 480.0))]
     #[arg(allow_negative_numbers = true)]
     pub refresh: f64,
@@ -42,9 +43,15 @@ pub struct Args {
     /// What makes them: auto, cpu, gpu or gpu:NAME
     #[arg(long, default_value_t = BackendChoice::Cpu)]
     pub backend: BackendChoice,
-    /// Where the daemon sends frames besides: shm (the demo alone), png:DIR or y4m:PATH
+    /// Where the daemon sends frames besides: shm (the demo alone), window, png:DIR or y4m:PATH
     #[arg(long, default_value_t = SinkSpec::Shm, value_parser = parse_sink)]
     pub sink: SinkSpec,
+    /// With --sink window: as large as the monitor
+    #[arg(long)]
+    pub fullscreen: bool,
+    /// With --sink window: the monitor, by its name
+    #[arg(long, value_name = "NAME")]
+    pub monitor: Option<String>,
     /// Folder for the pictures and the numbers
     #[arg(long, value_name = "DIR", default_value = "foreframe-demo")]
     pub out: PathBuf,
@@ -64,6 +71,7 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
         method: args.method,
         backend: args.backend.clone(),
         sink: args.sink.clone(),
+        window: WindowOptions { is_fullscreen: args.fullscreen, monitor: args.monitor.clone() },
         out: args.out.clone(),
     };
     let summary = demo::run(&settings, output)?;
@@ -74,7 +82,7 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
 fn parse_sink(spec: &str) -> Result<SinkSpec, String> {
     match spec.parse()? {
         SinkSpec::Null | SinkSpec::Y4mStdout => {
-            Err(format!("expected shm, png:DIR or y4m:PATH, found `{spec}`"))
+            Err(format!("expected shm, window, png:DIR or y4m:PATH, found `{spec}`"))
         }
         sink => Ok(sink),
     }

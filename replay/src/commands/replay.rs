@@ -62,10 +62,10 @@ pub struct Args {
     pub step: bool,
 }
 
-/// Standard output holds the digests, and nobody can subscribe to a replay.
+/// Standard output holds the digests, and nobody can subscribe to a replay or watch virtual time.
 fn parse_sink(spec: &str) -> Result<SinkSpec, String> {
     match spec.parse()? {
-        SinkSpec::Shm | SinkSpec::Y4mStdout => {
+        SinkSpec::Shm | SinkSpec::Y4mStdout | SinkSpec::Window => {
             Err(format!("expected null, png:DIR or y4m:PATH, found `{spec}`"))
         }
         sink => Ok(sink),

@@ -33,6 +33,8 @@ pub struct Submissions {
     pub statistics: Option<Statistics>,
     /// Where the daemon makes frames, in its own words.
     pub backend: String,
+    /// The refresh interval of the display, as the daemon tracks it.
+    pub refresh_interval: Option<MonoSpan>,
     /// The last counts of the first second.
     pub settled: Option<Statistics>,
 }
@@ -101,6 +103,10 @@ impl Application {
                     bail!("the daemon expected {}, found {}", error.expected, error.found)
                 }
                 Event::Statistics(statistics) => done.statistics = Some(statistics),
+                Event::Pacing(pacing) => {
+                    let ns = i64::try_from(pacing.refresh_interval_ns).unwrap_or(i64::MAX);
+                    done.refresh_interval = Some(MonoSpan::from_ns(ns));
+                }
                 Event::StreamEnded { .. } => has_ended = true,
                 _ => {}
             }

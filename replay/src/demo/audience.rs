@@ -232,6 +232,7 @@ mod tests {
             backend: foreframe_engine::backend::choice::BackendChoice::Cpu,
             method: Method::Linear,
             sink: foreframed::config::SinkSpec::Null,
+            window: foreframed::sink::window::WindowOptions::default(),
             out: PathBuf::new(),
         };
         let rehearsal = Rehearsal::render(&settings, &Output::new(true));

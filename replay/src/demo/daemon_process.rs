@@ -38,8 +38,15 @@ impl DaemonProcess {
             .prefix("foreframe-demo-")
             .tempdir()
             .context("making a folder for the demo's socket")?;
-        let child = Command::new(&program)
-            .arg("serve")
+        let mut command = Command::new(&program);
+        command.arg("serve");
+        if settings.window.is_fullscreen {
+            command.arg("--fullscreen");
+        }
+        if let Some(monitor) = &settings.window.monitor {
+            command.args(["--monitor", monitor]);
+        }
+        let child = command
             .arg("--socket")
             .arg(socket_in(folder.path()))
             .args(["--sink", &settings.sink.to_string()])

@@ -24,6 +24,7 @@ use foreframe_engine::{Method, MonoSpan};
 use foreframe_fixtures::{SceneInfo, Size};
 use foreframed::clock;
 use foreframed::config::SinkSpec;
+use foreframed::sink::window::WindowOptions;
 
 use crate::output::Output;
 use application::Application;
@@ -56,6 +57,8 @@ pub struct Settings {
     pub backend: BackendChoice,
     /// Sink of the daemon.
     pub sink: SinkSpec,
+    /// How its window opens, if that is the sink.
+    pub window: WindowOptions,
     /// Where the pictures and the summary go.
     pub out: PathBuf,
 }

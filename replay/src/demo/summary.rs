@@ -94,7 +94,7 @@ pub struct Summary {
     pub height: u32,
     /// Keys per second.
     pub key_rate_hz: f64,
-    /// Refreshes per second.
+    /// Refreshes per second; of a window, as the daemon tracked them.
     pub refresh_hz: f64,
     /// Where the pictures are.
     pub out: PathBuf,
@@ -122,6 +122,10 @@ impl Summary {
         let dropped = settled(|counts| counts.dropped);
         let planned = settled(|counts| counts.synthesised) + dropped;
         let Compared { db: compared, row_step } = Compared::new(seen, rehearsal);
+        let refresh_hz = match (&settings.sink, submissions.refresh_interval) {
+            (SinkSpec::Window, Some(tracked)) => 1.0 / tracked.as_secs_f64(),
+            _ => settings.refresh_hz,
+        };
         Self {
             key_frames: submissions.sent.len() as u64,
             skipped_keys: submissions.skipped,
@@ -132,7 +136,7 @@ impl Summary {
             dropped: count(|counts| counts.dropped),
             dropped_after_first_second: dropped,
             dropped_percent: 100.0 * ratio(dropped, planned),
-            content_judder: content_judder(&seen.frames, MonoSpan::from_hz(settings.refresh_hz)),
+            content_judder: content_judder(&seen.frames, MonoSpan::from_hz(refresh_hz)),
             psnr_rgb_db: mean(&compared),
             psnr_rgb_min_db: compared.iter().copied().min_by(f64::total_cmp),
             compared: compared.len() as u64,
@@ -147,7 +151,7 @@ impl Summary {
             width: settings.size.width,
             height: settings.size.height,
             key_rate_hz: settings.key_rate_hz,
-            refresh_hz: settings.refresh_hz,
+            refresh_hz,
             out: settings.out.clone(),
             pictures: Vec::new(),
             output_frames: settings.sink.keeps_frames().then(|| settings.sink.to_string()),
@@ -356,6 +360,7 @@ mod tests {
             backend: BackendChoice::Cpu,
             method: foreframe_engine::Method::Linear,
             sink: SinkSpec::Shm,
+            window: foreframed::sink::window::WindowOptions::default(),
             out: out.to_owned(),
         }
     }

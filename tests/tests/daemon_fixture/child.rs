@@ -17,6 +17,7 @@ use super::Client;
 const ROLE: &str = "FOREFRAME_TEST_ROLE";
 const SOCKET: &str = "FOREFRAME_TEST_SOCKET";
 const RECORD: &str = "FOREFRAME_TEST_RECORD";
+const SINK: &str = "FOREFRAME_TEST_SINK";
 const READY: &str = "the child is ready";
 
 /// What a child does.
@@ -50,8 +51,10 @@ pub(crate) fn run_if_asked() {
     let code = match role.as_str() {
         "daemon" => {
             let record = std::env::var_os(RECORD).map(Into::into);
-            let log = Some("warn".to_owned());
-            match foreframed::run(Args { socket, record, log, ..Args::default() }) {
+            let sink = std::env::var(SINK).ok().map(|sink| sink.parse().unwrap());
+            let log = Some(if sink.is_some() { "info" } else { "warn" }.to_owned());
+            let args = Args { socket, record, sink, log, ..Args::default() };
+            match foreframed::run(args) {
                 Ok(()) => 0,
                 Err(error) => {
                     eprintln!("foreframed: {error:#}");
@@ -82,6 +85,14 @@ fn wait_for_the_end() -> i32 {
 
 impl ChildProcess {
     pub(crate) fn spawn(role: Role, socket: &Path, record: Option<&Path>) -> Self {
+        let mut command = Self::command(role, socket);
+        if let Some(record) = record {
+            command.env(RECORD, record);
+        }
+        Self { child: command.spawn().unwrap() }
+    }
+
+    fn command(role: Role, socket: &Path) -> Command {
         let mut command = Command::new(std::env::current_exe().unwrap());
         command
             .args(["child_process", "--exact", "--nocapture"])
@@ -90,15 +101,38 @@ impl ChildProcess {
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped());
-        if let Some(record) = record {
-            command.env(RECORD, record);
-        }
+        command
+    }
+
+    /// A daemon that shows windows on the display that `environment` leads to, and writes its log to
+    /// a file.
+    pub(crate) fn daemon_with_windows(
+        socket: &Path,
+        environment: &[(&'static str, String)],
+        log: &Path,
+    ) -> Self {
+        Self::daemon_that_ends(socket, environment, log).listening(socket)
+    }
+
+    /// The same, where it will not get as far as listening.
+    pub(crate) fn daemon_that_ends(
+        socket: &Path,
+        environment: &[(&'static str, String)],
+        log: &Path,
+    ) -> Self {
+        let mut command = Self::command(Role::Daemon, socket);
+        command.env(SINK, "window").envs(environment.iter().map(|(name, value)| (name, value)));
+        command.stderr(std::fs::File::create(log).unwrap());
         Self { child: command.spawn().unwrap() }
     }
 
     /// A daemon that listens.
     pub(crate) fn daemon(socket: &Path, record: Option<&Path>) -> Self {
-        let mut child = Self::spawn(Role::Daemon, socket, record);
+        Self::spawn(Role::Daemon, socket, record).listening(socket)
+    }
+
+    fn listening(self, socket: &Path) -> Self {
+        let mut child = self;
         let patience = clock::now() + MonoSpan::from_ms(60_000);
         while foreframe_protocol::socket::Channel::connect(socket).is_err() {
             assert!(clock::now() < patience, "the daemon does not listen");

@@ -1,0 +1,121 @@
+//! A window of each stream on the desktop, and what the display says about each frame.
+//!
+//! A thread of the daemon's own ([`WindowSystem`]) makes windows and hears what users do with them.
+//! The stream's thread opens one [`Window`] and gives it pictures with [`Window::present`], which
+//! never waits for the display: on Wayland ([`wayland`]) it copies the picture into a shared-memory
+//! buffer that is free and asks for presentation feedback just before the commit; elsewhere
+//! ([`software`]) it leaves it to a thread that paints. What happens to a window and to its frames
+//! comes as [`WindowEvent`]s, and each wakes the stream.
+//!
+//! What a display lacks is done without, and named ([`Feedback`]): without presentation feedback, or
+//! with one that never answers, frames are paced by frame callbacks, and without those by a timer
+//! at the announced rate. A display that is gone leaves the daemon and its streams as they are.
+
+mod handle;
+mod placement;
+mod shared;
+mod software;
+mod system;
+mod texels;
+mod wayland;
+
+use std::io;
+
+use foreframe_engine::StreamFormat;
+
+use crate::stream::core::Told;
+
+pub use handle::Window;
+pub use system::{WindowOpener, WindowSystem};
+
+/// Where and how windows open.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct WindowOptions {
+    /// As large as the monitor. A key press changes it.
+    pub is_fullscreen: bool,
+    /// Name of the monitor to be shown on. A window that is not full screen opens there where the
+    /// window system lets applications choose, which Wayland does not.
+    pub monitor: Option<String>,
+}
+
+/// One window to open.
+#[derive(Clone, Debug)]
+pub struct WindowConfig {
+    /// Pictures that it is to show.
+    pub format: StreamFormat,
+    /// What the desktop calls it.
+    pub title: String,
+}
+
+/// Where a window knows from when its frames were shown.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Feedback {
+    /// The display tells the time of each.
+    Presentation,
+    /// It asks for the next one when it has shown one; good to a millisecond or so.
+    FrameCallbacks,
+    /// Nothing: frames are handed over at the announced rate.
+    Timer,
+}
+
+impl Feedback {
+    /// Name in status and logs.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Presentation => "presentation feedback",
+            Self::FrameCallbacks => "frame callbacks",
+            Self::Timer => "timer",
+        }
+    }
+}
+
+/// Why a window is closed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Closed {
+    /// Somebody has closed it.
+    ByUser,
+    /// The display is gone.
+    WithDisplay,
+}
+
+/// What happened to a window.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum WindowEvent {
+    /// What the pacer has to know.
+    Told(Told),
+    /// Frames are paced by this from now on.
+    Feedback(Feedback),
+    /// A key was pressed that the window has no use for itself: its character, in lower case.
+    Key(char),
+    /// It shows nothing any more.
+    Closed(Closed),
+}
+
+/// Why there is no window.
+#[derive(Debug, thiserror::Error)]
+pub enum WindowError {
+    /// No display, or one that does not work.
+    #[error("expected a display to open windows on, found none: {0}")]
+    NoDisplay(String),
+    /// The display did not answer in time, or is gone.
+    #[error("expected a display that answers, found {0}")]
+    NoAnswer(&'static str),
+    /// The display has no monitor of the wanted name.
+    #[error("expected a monitor named `{wanted}`, found {found}")]
+    NoMonitor {
+        /// The name that was asked for.
+        wanted: String,
+        /// Names of those that there are.
+        found: String,
+    },
+    /// The display refuses.
+    #[error("expected a window, found: {0}")]
+    Refused(String),
+    /// The display lacks something that cannot be done without.
+    #[error("expected a display with {0}, found one without")]
+    Lacks(&'static str),
+    /// Memory or a thread could not be had.
+    #[error("opening a window: {0}")]
+    Io(#[from] io::Error),
+}

@@ -1,0 +1,124 @@
+//! Pictures for displays without Wayland: a thread scales and paints them.
+//!
+//! Painting may wait for the display, so the stream leaves its picture in a place for one and goes
+//! on; what the painter did not get to is replaced by the next. Nothing tells when it was shown.
+
+use std::num::NonZeroU32;
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::thread;
+
+use foreframe_engine::{ColorPlane, StreamFormat};
+use softbuffer::{Context, SoftBufferError, Surface};
+use tracing::warn;
+use winit::event_loop::OwnedDisplayHandle;
+use winit::window::Window as DesktopWindow;
+
+use super::placement::Placement;
+use super::shared::Shared;
+use super::texels::{ByteOrder, Texels};
+use super::{Closed, WindowError};
+
+/// Paints a window. Its thread ends when this is dropped and the display lets it.
+#[derive(Debug)]
+pub(super) struct Painter {
+    easel: Arc<Easel>,
+}
+
+/// The place for one picture.
+#[derive(Debug, Default)]
+struct Easel {
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    next: Option<ColorPlane>,
+    /// A picture that was painted, for its memory.
+    spare: Option<ColorPlane>,
+    is_over: bool,
+}
+
+impl Painter {
+    pub(super) fn start(
+        window: Arc<DesktopWindow>,
+        display: OwnedDisplayHandle,
+        format: &StreamFormat,
+        shared: Arc<Shared>,
+    ) -> Result<Self, WindowError> {
+        let easel = Arc::new(Easel::default());
+        let (place, format) = (Arc::clone(&easel), *format);
+        thread::Builder::new().name("foreframe-painter".to_owned()).spawn(move || {
+            if let Err(error) = paint_all(window, display, &format, &place, &shared) {
+                warn!(%error, "the window cannot be painted");
+                shared.close(Closed::WithDisplay);
+            }
+        })?;
+        Ok(Self { easel })
+    }
+
+    /// Leaves `frame` for the painter.
+    pub(super) fn present(&self, frame: &ColorPlane) -> bool {
+        let mut state = self.easel.state.lock().unwrap_or_else(PoisonError::into_inner);
+        match state.next.take().or_else(|| state.spare.take()) {
+            Some(mut place) => {
+                place.copy_from(frame);
+                state.next = Some(place);
+            }
+            None => state.next = Some(frame.clone()),
+        }
+        self.easel.changed.notify_one();
+        true
+    }
+}
+
+impl Drop for Painter {
+    fn drop(&mut self) {
+        self.easel.state.lock().unwrap_or_else(PoisonError::into_inner).is_over = true;
+        self.easel.changed.notify_one();
+    }
+}
+
+impl Easel {
+    /// Waits for the next picture; None when there will be none.
+    fn take(&self, painted: Option<ColorPlane>) -> Option<ColorPlane> {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        state.spare = painted;
+        loop {
+            if state.is_over {
+                return None;
+            }
+            if let Some(next) = state.next.take() {
+                return Some(next);
+            }
+            state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+}
+
+fn paint_all(
+    window: Arc<DesktopWindow>,
+    display: OwnedDisplayHandle,
+    format: &StreamFormat,
+    easel: &Easel,
+    shared: &Shared,
+) -> Result<(), SoftBufferError> {
+    let context = Context::new(display)?;
+    let mut surface = Surface::new(&context, window)?;
+    let mut texels = Texels::new(format, ByteOrder::Bgrx);
+    let mut painted = None;
+    while let Some(frame) = easel.take(painted.take()) {
+        let placement = Placement::scaled([frame.width(), frame.height()], shared.size());
+        let [width, height] =
+            placement.buffer.map(|length| NonZeroU32::new(length).expect("a side is at least 1"));
+        surface.resize(width, height)?;
+        let mut buffer = surface.buffer_mut()?;
+        let drawn = texels.draw(&frame, &placement);
+        for (pixel, texel) in buffer.iter_mut().zip(drawn.as_chunks::<4>().0) {
+            *pixel = u32::from_le_bytes([texel[0], texel[1], texel[2], 0]);
+        }
+        buffer.present()?;
+        painted = Some(frame);
+    }
+    Ok(())
+}

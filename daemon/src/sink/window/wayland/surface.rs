@@ -1,0 +1,307 @@
+//! The surface: a free buffer, what is asked for with it, and the commit.
+
+use std::io::ErrorKind;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use foreframe_engine::{ColorPlane, MonoTime, StreamFormat};
+use tracing::{debug, warn};
+use wayland_client::backend::WaylandError;
+use wayland_client::globals::registry_queue_init;
+use wayland_client::protocol::wl_shm::WlShm;
+use wayland_client::protocol::wl_surface::WlSurface;
+use wayland_client::{Connection, EventQueue, Proxy as _, QueueHandle};
+use wayland_protocols::wp::presentation_time::client::wp_presentation::WpPresentation;
+use wayland_protocols::wp::viewporter::client::wp_viewport::WpViewport;
+use wayland_protocols::wp::viewporter::client::wp_viewporter::WpViewporter;
+
+use super::answers::Answers;
+use super::guest::{Anchor, Guest};
+use super::listener::Listener;
+use super::pool::{Buffer, Pool};
+use crate::sink::window::placement::Placement;
+use crate::sink::window::shared::Shared;
+use crate::sink::window::texels::{ByteOrder, Texels};
+use crate::sink::window::{Closed, Feedback, WindowError};
+
+/// Time that a compositor has to say what it offers.
+const ANSWER_WITHIN: Duration = Duration::from_secs(5);
+/// Where a compositor has this, winit makes the surface's viewport, and there can be but one.
+const FRACTIONAL_SCALE: &str = "wp_fractional_scale_manager_v1";
+
+/// A window's surface.
+#[derive(Debug)]
+pub(in crate::sink::window) struct WaylandSurface {
+    shared: Arc<Shared>,
+    answers: Arc<Mutex<Answers>>,
+    is_ending: Arc<AtomicBool>,
+    listener: Option<JoinHandle<()>>,
+    globals: Globals,
+    texels: Texels,
+    pool: Option<Pool>,
+    /// Buffers of former sizes that the compositor has not given back.
+    retired: Vec<Buffer>,
+    logical_size: [u32; 2],
+    /// Pictures for which no buffer was free.
+    without_buffer: u64,
+    surface: WlSurface,
+    connection: Connection,
+    /// After everything that is on the connection.
+    _anchor: Arc<Anchor>,
+}
+
+/// What the compositor offers.
+#[derive(Debug)]
+struct Globals {
+    handle: QueueHandle<Listener>,
+    shm: WlShm,
+    presentation: Option<WpPresentation>,
+    order: ByteOrder,
+    stretch: Stretch,
+}
+
+/// Who makes a buffer fill the window.
+#[derive(Debug)]
+enum Stretch {
+    /// The compositor, as winit tells it to.
+    ByWinit,
+    /// The compositor, as we tell it to.
+    ByUs(WpViewport),
+    /// Nobody: a buffer has the window's size.
+    No,
+}
+
+impl WaylandSurface {
+    pub(in crate::sink::window) fn new(
+        guest: Guest,
+        format: &StreamFormat,
+        shared: Arc<Shared>,
+    ) -> Result<Self, WindowError> {
+        let Guest { surface, connection, anchor } = guest;
+        let anchor = Arc::new(anchor);
+        let answers = Arc::new(Mutex::new(Answers::new(true)));
+        let is_ending = Arc::new(AtomicBool::new(false));
+        let (tell, told) = sync_channel(1);
+        let thread = {
+            // The queue that the thread makes needs the anchor for as long as it is there.
+            let (anchor, connection) = (Arc::clone(&anchor), connection.clone());
+            let (surface, is_ending) = (surface.clone(), Arc::clone(&is_ending));
+            let listener = Listener::new(Arc::clone(&shared), Arc::clone(&answers));
+            thread::Builder::new().name("foreframe-listener".to_owned()).spawn(move || {
+                let _anchor = anchor;
+                if let Some((queue, listener)) = bind(connection, &surface, listener, &tell) {
+                    drop((surface, tell));
+                    listener.listen(queue, &is_ending);
+                }
+            })?
+        };
+        let globals = match told.recv_timeout(ANSWER_WITHIN) {
+            Ok(globals) => globals?,
+            Err(RecvTimeoutError::Timeout) => {
+                is_ending.store(true, Ordering::Relaxed);
+                return Err(WindowError::NoAnswer("none in 5 s"));
+            }
+            Err(RecvTimeoutError::Disconnected) => {
+                return Err(WindowError::NoAnswer("one that is gone"));
+            }
+        };
+        *answers.lock().unwrap_or_else(PoisonError::into_inner) =
+            Answers::new(globals.presentation.is_some());
+        debug!(order = ?globals.order, stretch = ?globals.stretch, "surface");
+        Ok(Self {
+            shared,
+            answers,
+            is_ending,
+            listener: Some(thread),
+            texels: Texels::new(format, globals.order),
+            globals,
+            pool: None,
+            retired: Vec::new(),
+            logical_size: [0; 2],
+            without_buffer: 0,
+            surface,
+            connection,
+            _anchor: anchor,
+        })
+    }
+
+    pub(in crate::sink::window) fn feedback(&self) -> Feedback {
+        self.answers.lock().unwrap_or_else(PoisonError::into_inner).mode()
+    }
+
+    /// Commits `frame`, if there is a buffer for it.
+    pub(in crate::sink::window) fn present(
+        &mut self,
+        planned: MonoTime,
+        frame: &ColorPlane,
+    ) -> bool {
+        if !self.surface.is_alive() || !self.has_fitting_pool([frame.width(), frame.height()]) {
+            return false;
+        }
+        let Some(pool) = &self.pool else { return false };
+        let Some(index) = pool.free() else {
+            self.without_buffer += 1;
+            return false;
+        };
+        if let Err(error) = pool.write(index, &mut self.texels, frame) {
+            warn!(%error, "a picture did not reach its buffer");
+            return false;
+        }
+        self.ask(planned);
+        self.stretch();
+        self.commit(index)
+    }
+
+    /// Makes buffers of the window's shape, if there are none.
+    fn has_fitting_pool(&mut self, picture: [u32; 2]) -> bool {
+        self.retired.retain(|buffer| {
+            let is_free = buffer.is_free();
+            if is_free {
+                buffer.proxy.destroy();
+            }
+            !is_free
+        });
+        let window = self.shared.size();
+        let placement = match self.globals.stretch {
+            Stretch::No => Placement::scaled(picture, window),
+            Stretch::ByWinit | Stretch::ByUs(_) => Placement::padded(picture, window),
+        };
+        if self.pool.as_ref().is_some_and(|pool| pool.placement == placement) {
+            return true;
+        }
+        let Globals { shm, handle, order, .. } = &self.globals;
+        match Pool::allocate(shm, handle, placement, *order) {
+            Ok(pool) => {
+                debug!(?window, ?placement, "buffers");
+                let former = self.pool.replace(pool);
+                self.retired.extend(former.into_iter().flat_map(Pool::into_buffers));
+                true
+            }
+            Err(error) => {
+                warn!(%error, "there are no buffers for the window");
+                false
+            }
+        }
+    }
+
+    /// Makes the next commit fill the window.
+    fn stretch(&mut self) {
+        let Stretch::ByUs(viewport) = &self.globals.stretch else { return };
+        // winit sets the scale of a surface that it makes no viewport for; ours makes up for it.
+        self.surface.set_buffer_scale(1);
+        let logical_size = self.shared.logical_size();
+        if logical_size != self.logical_size && logical_size.iter().all(|&length| length > 0) {
+            let [width, height] = logical_size.map(u32::cast_signed);
+            viewport.set_destination(width, height);
+            self.logical_size = logical_size;
+        }
+    }
+
+    /// For word of the next commit.
+    fn ask(&self, planned: MonoTime) {
+        let handle = &self.globals.handle;
+        let (ask, change) = self.answers.lock().unwrap_or_else(PoisonError::into_inner).on_frame();
+        change.into_iter().for_each(|change| self.shared.tell(change.into()));
+        if let Some(presentation) = self.globals.presentation.as_ref().filter(|_| ask.feedback) {
+            presentation.feedback(&self.surface, handle, planned);
+        }
+        if ask.callback {
+            self.surface.frame(handle, planned);
+        }
+    }
+
+    fn commit(&self, index: usize) -> bool {
+        let Some(pool) = &self.pool else { return false };
+        let Buffer { proxy, is_busy } = pool.buffer(index);
+        is_busy.store(true, Ordering::Relaxed);
+        let [width, height] = pool.placement.buffer.map(u32::cast_signed);
+        self.surface.attach(Some(proxy), 0, 0);
+        self.surface.damage_buffer(0, 0, width, height);
+        self.surface.commit();
+        match self.connection.flush() {
+            Ok(()) => true,
+            // The rest goes out with the next frame.
+            Err(WaylandError::Io(error)) if error.kind() == ErrorKind::WouldBlock => true,
+            Err(error) => {
+                debug!(%error, "the compositor takes nothing");
+                self.shared.close(Closed::WithDisplay);
+                false
+            }
+        }
+    }
+}
+
+impl Drop for WaylandSurface {
+    fn drop(&mut self) {
+        self.is_ending.store(true, Ordering::Relaxed);
+        if let Some(listener) = self.listener.take()
+            && listener.join().is_err()
+        {
+            warn!("the thread that listens to the compositor has panicked");
+        }
+        let buffers = self.pool.take().map(Pool::into_buffers).unwrap_or_default();
+        self.retired.drain(..).chain(buffers).for_each(|buffer| buffer.proxy.destroy());
+        if let Stretch::ByUs(viewport) = &self.globals.stretch {
+            viewport.destroy();
+        }
+        if let Some(presentation) = &self.globals.presentation {
+            presentation.destroy();
+        }
+        // Without a compositor there is nothing left to destroy.
+        drop(self.connection.flush());
+        if self.without_buffer > 0 {
+            warn!(
+                pictures = self.without_buffer,
+                "the compositor kept all buffers for some pictures"
+            );
+        }
+    }
+}
+
+type Bound = (EventQueue<Listener>, Listener);
+
+/// Binds what the surface needs, tells it, and gives back what goes on listening.
+fn bind(
+    connection: Connection,
+    surface: &WlSurface,
+    mut listener: Listener,
+    tell: &SyncSender<Result<Globals, WindowError>>,
+) -> Option<Bound> {
+    let found = registry_queue_init::<Listener>(&connection)
+        .map_err(|error| WindowError::NoDisplay(error.to_string()))
+        .and_then(|(list, mut queue)| {
+            let handle = queue.handle();
+            let shm: WlShm =
+                list.bind(&handle, 1..=1, ()).map_err(|_| WindowError::Lacks("wl_shm"))?;
+            let presentation: Option<WpPresentation> = list.bind(&handle, 1..=1, ()).ok();
+            let has = |name: &str| {
+                list.contents().with_list(|all| all.iter().any(|one| one.interface == name))
+            };
+            let viewporter: Option<WpViewporter> = list.bind(&handle, 1..=1, ()).ok();
+            let stretch = match viewporter {
+                Some(_) if has(FRACTIONAL_SCALE) => Stretch::ByWinit,
+                Some(viewporter) => Stretch::ByUs(viewporter.get_viewport(surface, &handle, ())),
+                None => Stretch::No,
+            };
+            // Formats and the clock have come when this returns.
+            queue
+                .roundtrip(&mut listener)
+                .map_err(|error| WindowError::NoDisplay(error.to_string()))?;
+            let order = if listener.knows_rgbx { ByteOrder::Rgbx } else { ByteOrder::Bgrx };
+            Ok((queue, Globals { handle, shm, presentation, order, stretch }))
+        });
+    match found {
+        Ok((queue, globals)) => {
+            tell.send(Ok(globals)).ok()?;
+            Some((queue, listener))
+        }
+        Err(error) => {
+            // Whoever asked may have given up.
+            drop(tell.send(Err(error)));
+            None
+        }
+    }
+}
