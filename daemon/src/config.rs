@@ -12,7 +12,8 @@ use std::str::FromStr;
 use std::time::Duration;
 
 use foreframe_engine::backend::choice::BackendChoice;
-use foreframe_engine::{Method, MonoSpan};
+use foreframe_engine::{FinishConfig, FinishMode, Method, MonoSpan};
+use foreframe_perception::display::DisplayProfile;
 use serde::{Deserialize, Deserializer};
 use tracing_subscriber::EnvFilter;
 
@@ -59,6 +60,15 @@ pub struct Args {
     /// follow
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub ppd: Option<f32>,
+    /// Blur in in-between frames, made up for in their keys: off, on, or auto, as far as no flicker is
+    /// seen [default: off]
+    #[arg(long)]
+    #[serde(default, deserialize_with = "from_name")]
+    pub finish: Option<FinishMode>,
+    /// Display that shows the output: a built-in profile (`foreframe perception displays`) or a file
+    /// that ends in .toml. Where there is no --ppd it gives that too, from 65 cm before a screen
+    #[arg(long, value_name = "NAME")]
+    pub profile: Option<String>,
     /// What to log on standard error: error, warn, info, debug, trace, or a filter such as
     /// foreframed::session=debug [default: info]
     #[arg(long, value_name = "LEVEL")]
@@ -137,6 +147,30 @@ impl<'de> Deserialize<'de> for SinkSpec {
     }
 }
 
+/// A display profile by its name, or from a file whose name ends in `.toml`.
+///
+/// # Errors
+/// Which names there are, or what is wrong with the file.
+pub fn read_profile(name: &str) -> Result<DisplayProfile, UsageError> {
+    let wrong = |error: &dyn fmt::Display| UsageError(format!("profile {name}: {error}"));
+    if !name.ends_with(".toml") {
+        return DisplayProfile::builtin(name).map_err(|error| wrong(&error));
+    }
+    let text = fs::read_to_string(name).map_err(|error| wrong(&error))?;
+    DisplayProfile::parse(&text).map_err(|error| wrong(&error))
+}
+
+/// Pixels per degree of a display: of a headset, or of a screen from [`VIEWING_CM`]. None where the
+/// profile does not say how large it is.
+#[must_use]
+#[expect(clippy::cast_possible_truncation, reason = "an angular size needs no more digits")]
+pub fn profile_ppd(profile: &DisplayProfile) -> Option<f32> {
+    profile.ppd(VIEWING_CM).ok().map(|ppd| (ppd as f32).clamp(1.0, 1000.0))
+}
+
+/// From how far a screen is seen where nobody says, cm (Denes 2020, section 7.2).
+pub const VIEWING_CM: f64 = 65.0;
+
 /// A count of things of which there is at least one.
 ///
 /// # Errors
@@ -186,6 +220,8 @@ pub struct Config {
     pub threads: NonZeroUsize,
     /// Angular size of a pixel, which turns on damping.
     pub pixels_per_degree: Option<f32>,
+    /// Whether detail moves from in-between frames to their keys, and the display that it is for.
+    pub finish: FinishConfig,
     /// Filter of the log.
     pub log: String,
     /// Clients at once.
@@ -230,6 +266,8 @@ impl Args {
             record: self.record.or(file.record),
             threads: self.threads.or(file.threads),
             ppd: self.ppd.or(file.ppd),
+            finish: self.finish.or(file.finish),
+            profile: self.profile.or(file.profile),
             log: self.log.or(file.log),
             max_clients: self.max_clients.or(file.max_clients),
             memory_mb: self.memory_mb.or(file.memory_mb),
@@ -247,6 +285,7 @@ impl Args {
                 format!("--ppd: expected 1 to 1000 pixels per degree, found {ppd}")
             })?;
         }
+        let profile = self.profile.as_deref().map(read_profile).transpose()?;
         let max_clients = self.max_clients.unwrap_or(16);
         ensure((1..=256).contains(&max_clients), || {
             format!("--max-clients: expected 1 to 256, found {max_clients}")
@@ -260,16 +299,19 @@ impl Args {
             format!("--log: expected a level, or a filter such as foreframed=debug, found `{log}`")
         })?;
         let processors = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
+        let refresh_interval = MonoSpan::from_hz(refresh);
+        let mode = self.finish.unwrap_or_default();
         Ok(Config {
             socket: self.socket,
             sink: self.sink.unwrap_or_default(),
             window: WindowOptions { is_fullscreen: self.fullscreen, monitor: self.monitor },
-            refresh_interval: MonoSpan::from_hz(refresh),
+            refresh_interval,
             backend: self.backend.unwrap_or(BackendChoice::Auto),
             method: self.method.unwrap_or_default(),
             record: self.record,
             threads: self.threads.unwrap_or(processors),
-            pixels_per_degree: self.ppd,
+            pixels_per_degree: self.ppd.or_else(|| profile.as_ref().and_then(profile_ppd)),
+            finish: FinishConfig::new(mode, profile.as_ref(), refresh_interval),
             log,
             max_clients,
             memory_per_client: memory_mb << 20,
@@ -315,7 +357,7 @@ mod tests {
     }
 
     /// Every option with a value that is not its default, by the name that flag and file share.
-    const EVERY_OPTION: [(&str, &str, &str); 13] = [
+    const EVERY_OPTION: [(&str, &str, &str); 15] = [
         ("socket", "/run/x", "'/run/x'"),
         ("sink", "png:out", "'png:out'"),
         ("fullscreen", "", "true"),
@@ -326,6 +368,8 @@ mod tests {
         ("record", "a.mcap", "'a.mcap'"),
         ("threads", "3", "3"),
         ("ppd", "56", "56"),
+        ("finish", "auto", "'auto'"),
+        ("profile", "htc-vive", "'htc-vive'"),
         ("log", "trace", "'trace'"),
         ("max-clients", "2", "2"),
         ("memory-mb", "64", "64"),
@@ -361,6 +405,17 @@ mod tests {
     }
 
     #[test]
+    fn a_profile_says_how_large_a_pixel_is_unless_that_is_said_too() {
+        let headset = flags("--profile htc-vive").resolve().unwrap();
+        assert!(headset.pixels_per_degree.is_some_and(|ppd| ppd < 30.0));
+        let screen = flags("--profile asus-pg279q").resolve().unwrap();
+        assert!(screen.pixels_per_degree.is_some_and(|ppd| (40.0..60.0).contains(&ppd)));
+        assert_eq!(screen.finish.peak_cd_m2, Some(155.2));
+        let both = flags("--profile asus-pg279q --ppd 70").resolve().unwrap();
+        assert_eq!(both.pixels_per_degree, Some(70.0));
+    }
+
+    #[test]
     fn an_unknown_name_in_the_file_is_named_with_its_line() {
         let error = with_file("", "refresh = 60\nsinc = 'null'").unwrap_err().to_string();
         assert!(error.contains("line 2") && error.contains("`sinc`"), "{error}");
@@ -374,6 +429,7 @@ mod tests {
             ("--refresh nan", "found NaN"),
             ("--refresh 1001", "found 1001"),
             ("--ppd 0", "found 0"),
+            ("--profile crt", "found `crt`"),
             ("--max-clients 0", "found 0"),
             ("--memory-mb 0", "found 0"),
             ("--memory-mb 99999999", "found 99999999"),

@@ -14,6 +14,7 @@ use crate::backend::{BackendStatus, FrameInput};
 use crate::color::ColorPlane;
 use crate::decode::{DecodeError, DecodeScratch, decode_key};
 use crate::field::FieldMap;
+use crate::finish::{Finish, FinishConfig};
 use crate::format::{DepthMeaning, StreamFormat};
 use crate::key::{KeyFrame, KeyInput};
 use crate::method::Method;
@@ -32,6 +33,8 @@ pub struct EngineConfig {
     /// Pixels per degree of visual angle. Turns on the damping of motion that no eye can follow;
     /// None leaves motion as it is.
     pub pixels_per_degree: Option<f32>,
+    /// Whether detail moves from in-between frames to their keys. On its own it is off.
+    pub finish: FinishConfig,
     /// Which ways through the kernels are taken. The result does not depend on it.
     pub simd: Simd,
     /// Runs on each worker thread when it starts, for a priority that the engine knows nothing of.
@@ -41,7 +44,7 @@ pub struct EngineConfig {
 }
 
 impl EngineConfig {
-    /// Makes frames by `method` on `threads`: undamped, by the widest registers, without asking for
+    /// Makes frames by `method` on `threads`: undamped, not finished, by the widest registers, without asking for
     /// priority, and with a timer that stands still.
     #[must_use]
     pub fn new(method: Method, threads: NonZeroUsize) -> Self {
@@ -49,6 +52,7 @@ impl EngineConfig {
             method,
             threads,
             pixels_per_degree: None,
+            finish: FinishConfig::default(),
             simd: Simd::Widest,
             worker_started: || (),
             timer: || MonoTime::ZERO,
@@ -106,6 +110,8 @@ pub struct Engine {
     /// Of methods whose trajectories are more than the motion field.
     ladder: Option<Ladder>,
     backend: Backend,
+    /// Of streams whose pictures are finished.
+    finish: Option<Finish>,
 }
 
 /// Buffers of the steps, kept from frame to frame.
@@ -129,6 +135,7 @@ impl Engine {
             scratch: Scratch::default(),
             ladder: Ladder::new(config.method, config.pixels_per_degree),
             backend: Backend::default(),
+            finish: Finish::new(&format, &config.finish, config.pixels_per_degree),
         }
     }
 
@@ -202,6 +209,9 @@ impl Engine {
         if input.is_cut {
             self.spare = self.previous.take().unwrap_or_default();
         }
+        if let Some(finish) = &mut self.finish {
+            finish.ledger.on_key(input.is_cut);
+        }
         Ok(KeyReport {
             work: (self.config.timer)() - started_at,
             motion,
@@ -240,6 +250,21 @@ impl Engine {
         pool.install(|| self.make(content_time, out))
     }
 
+    /// Whether a picture of a content time that has just been shown would be another one now,
+    /// because finishing gives each frame of a key its own part of the light.
+    #[must_use]
+    pub fn alternates(&self) -> bool {
+        self.finish.as_ref().is_some_and(|finish| !finish.ledger.is_settled())
+    }
+
+    /// The last picture was not shown; the display showed the one before again. To be told where
+    /// pictures are finished: the light of those that follow makes up for it.
+    pub fn picture_dropped(&mut self) {
+        if let Some(finish) = &mut self.finish {
+            finish.ledger.dropped();
+        }
+    }
+
     fn make(&mut self, content_time: MonoTime, out: &mut ColorPlane) -> Option<FrameReport> {
         let started_at = (self.config.timer)();
         self.catch_up();
@@ -272,6 +297,10 @@ impl Engine {
             let map = &self.scratch.map;
             let frame = FrameInput { method, phase, newest: key, previous, map };
             self.backend.make(&self.pool, &frame, out);
+        }
+        if let Some(finish) = &mut self.finish {
+            let part = finish.ledger.next_part();
+            finish.apply(&self.pool, part, key.valid, out);
         }
         // What lies before the newest key has no position after it.
         let phase = if self.config.method.interpolates() { Phase::ZERO } else { phase };

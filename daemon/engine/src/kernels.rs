@@ -52,6 +52,8 @@ pub const KERNELS: &[Kernel] = &[
     exact("warp/linear", "warp_linear", Some(&LINEAR)),
     exact("warp/grid", "warp_grid", Some(&GRID)),
     exact("warp/voxel", "warp_voxel", None),
+    exact("finish/pyramid", "pyramid", None),
+    exact("finish/compensate", "compensate", None),
 ];
 
 #[cfg(test)]

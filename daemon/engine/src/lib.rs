@@ -6,7 +6,8 @@
 //! Flow of a key frame: [`decode`] converts what the application declared to the one convention
 //! inside; [`evidence`] judges what was predicted of it; [`trajectory`] says how its surfaces go on
 //! and quantises that; of an in-between frame: [`warp`]
-//! scatters or gathers along the trajectories, [`fill`] repairs what no source pixel lands on.
+//! scatters or gathers along the trajectories, [`fill`] repairs what no source pixel lands on,
+//! [`finish`] moves detail from in-between frames to their keys where it is asked to.
 //! [`engine`] runs these steps in order, [`pacing`] says for which content time.
 //!
 //! Everything after the trajectory is integer arithmetic, so that one input gives one output on
@@ -20,6 +21,7 @@ pub mod engine;
 pub mod evidence;
 pub mod field;
 pub mod fill;
+pub mod finish;
 pub mod format;
 pub mod kernels;
 pub mod key;
@@ -39,6 +41,7 @@ pub mod warp;
 pub use color::ColorPlane;
 pub use decode::DecodeError;
 pub use engine::{Engine, EngineConfig, FrameReport, KeyReport};
+pub use finish::{FinishConfig, FinishMode};
 pub use format::StreamFormat;
 pub use key::{Camera, KeyFrame, KeyInput, Pixels, PlaneInput, ReadPixels};
 pub use method::Method;

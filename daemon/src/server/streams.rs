@@ -101,6 +101,7 @@ impl Server {
             core: CoreConfig {
                 engine: EngineConfig {
                     pixels_per_degree: config.pixels_per_degree,
+                    finish: config.finish,
                     timer: clock::now,
                     worker_started: thread::ask_for_real_time_work,
                     ..EngineConfig::new(config.method, config.threads)

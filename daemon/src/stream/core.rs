@@ -289,7 +289,8 @@ impl StreamCore {
         self.pacer.start(plan);
         let is_shown_already = self
             .shown
-            .is_some_and(|shown| (shown.content_time, shown.keys) == (content_time, key.taken));
+            .is_some_and(|shown| (shown.content_time, shown.keys) == (content_time, key.taken))
+            && !self.engine.alternates();
         if is_shown_already {
             if let Display::Timer(_) = self.display {
                 self.pacer.on_presented(plan.present_at, plan.present_at, plan.present_at);
@@ -311,6 +312,7 @@ impl StreamCore {
         self.counted_until = Some(plan.present_at);
         if presented_at > plan.present_at {
             self.pacer.on_dropped();
+            self.engine.picture_dropped();
             self.counts.dropped += 1;
             return Some(FrameOutcome::Dropped(DroppedFrame { kind, work: report.work }));
         }

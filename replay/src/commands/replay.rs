@@ -6,8 +6,8 @@ use std::path::PathBuf;
 
 use anyhow::{Context as _, bail};
 use foreframe_engine::backend::choice::BackendChoice;
-use foreframe_engine::{Method, MonoSpan};
-use foreframed::config::SinkSpec;
+use foreframe_engine::{FinishConfig, FinishMode, Method, MonoSpan};
+use foreframed::config::{SinkSpec, profile_ppd, read_profile};
 use foreframed::gpu;
 use foreframed::sink::Sink;
 use serde::Serialize;
@@ -47,6 +47,14 @@ pub struct Args {
     /// follow [default: as in the capture, which is without, unless it was recorded with `--ppd`]
     #[arg(long, value_name = "N", value_parser = number(1.0, 1000.0), allow_negative_numbers = true)]
     pub ppd: Option<f64>,
+    /// Blur in in-between frames, made up for in their keys: off, on, or auto, as far as no flicker is
+    /// seen.
+    #[arg(long, default_value_t = FinishMode::Off)]
+    pub finish: FinishMode,
+    /// Display that the output is for: a built-in profile (see `perception displays`) or a file that
+    /// ends in .toml. Without --ppd it gives that too, from 65 cm before a screen.
+    #[arg(long, value_name = "NAME")]
+    pub profile: Option<String>,
     /// Take every N-th frame as a key, from frame 0, and leave out the others.
     #[arg(long, value_name = "N", default_value = "1", value_parser = parse_count)]
     #[arg(allow_negative_numbers = true)]
@@ -113,6 +121,8 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
     let reader = KeyReader::new(recording.format(), &plan)?;
     let refresh_interval = MonoSpan::from_hz(args.refresh);
     let timing = if args.step { KeyTiming::Stepped } else { KeyTiming::AsRecorded };
+    let profile = args.profile.as_deref().map(read_profile).transpose()?;
+    let profile = profile.as_ref();
     let config = ReplayConfig {
         method: args.method,
         gpu: gpu::open(&args.backend).context("--backend")?,
@@ -122,9 +132,12 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
         pixels_per_degree: match args.ppd {
             #[expect(clippy::cast_possible_truncation, reason = "a number of 1 to 1000")]
             Some(ppd) => Some(ppd as f32),
-            None => recording.pixels_per_degree()?,
+            None => {
+                profile.map_or_else(|| recording.pixels_per_degree(), |it| Ok(profile_ppd(it)))?
+            }
         },
         late_cameras: timed_poses(&recording.late_cameras(), recording.heads(), &plan, timing),
+        finish: FinishConfig::new(args.finish, profile, refresh_interval),
     };
     let mut sink = Sink::open(&args.sink, reader.format(), refresh_interval, 0)
         .with_context(|| format!("--sink {}", args.sink))?;

@@ -6,13 +6,14 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use anyhow::Context as _;
-use foreframe_engine::Method;
 use foreframe_engine::backend::choice::BackendChoice;
 use foreframe_engine::backend::gpu::Gpu;
+use foreframe_engine::{FinishConfig, FinishMode, Method, MonoSpan};
+use foreframed::config::read_profile;
 use foreframed::{clock, gpu};
 
 use super::plot;
-use crate::options::{parse_count, parse_ratio};
+use crate::options::{number, parse_count, parse_ratio};
 use crate::output::Output;
 use crate::recording::Recording as _;
 use crate::recording::capture::CaptureRecording;
@@ -45,6 +46,18 @@ pub struct Args {
     /// that sends late cameras gets. Their rows say so.
     #[arg(long)]
     pub late_camera: bool,
+    /// Blur in in-between frames, made up for in their keys: off, on, or auto, as far as no flicker is
+    /// seen.
+    #[arg(long, default_value_t = FinishMode::Off)]
+    pub finish: FinishMode,
+    /// Display that frames are finished for: a built-in profile (see `perception displays`) or a file
+    /// that ends in .toml.
+    #[arg(long, value_name = "NAME")]
+    pub profile: Option<String>,
+    /// Refresh rate that `--finish auto` is for, 1 to 1000.
+    #[arg(long, value_name = "HZ", default_value_t = 120.0, value_parser = number(1.0, 1000.0))]
+    #[arg(allow_negative_numbers = true)]
+    pub refresh: f64,
     /// Chart of speed against accuracy, FILE.svg or FILE.png; may be given for each.
     #[arg(long, value_name = "FILE", value_parser = plot::parse_plot)]
     pub chart: Vec<PathBuf>,
@@ -62,7 +75,10 @@ pub struct Methods(pub Vec<Method>);
 /// # Errors
 /// If a capture cannot be read.
 pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
+    let profile = args.profile.as_deref().map(read_profile).transpose()?;
+    let refresh_interval = MonoSpan::from_hz(args.refresh);
     let options = ScoreOptions {
+        finish: FinishConfig::new(args.finish, profile.as_ref(), refresh_interval),
         methods: args.methods.0.clone(),
         ratio: args.ratio,
         backends: args

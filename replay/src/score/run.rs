@@ -12,7 +12,10 @@ use std::sync::Arc;
 
 use anyhow::{Context as _, ensure};
 use foreframe_engine::backend::gpu::Gpu;
-use foreframe_engine::{ColorPlane, Engine, EngineConfig, Method, MonoTime, Plane, StreamFormat};
+use foreframe_engine::{
+    ColorPlane, Engine, EngineConfig, FinishConfig, FinishMode, Method, MonoTime, Plane,
+    StreamFormat,
+};
 use foreframed::sink::srgb::SrgbConverter;
 use rayon::prelude::*;
 
@@ -39,6 +42,8 @@ pub struct ScoreOptions {
     pub timer: fn() -> MonoTime,
     /// How many frames to keep for a flip viewer, spread over the recording.
     pub kept_frames: usize,
+    /// Whether detail moves from in-between frames to their keys, which are then made too.
+    pub finish: FinishConfig,
     /// Tells methods that know cameras where the recording's is at the time of each frame.
     pub late_camera: bool,
 }
@@ -169,8 +174,11 @@ fn engine_of(
     options: &ScoreOptions,
 ) -> Engine {
     // Not damped: damping is for eyes, and the metrics have none.
-    let config =
-        EngineConfig { timer: options.timer, ..EngineConfig::new(method, options.threads) };
+    let config = EngineConfig {
+        timer: options.timer,
+        finish: options.finish,
+        ..EngineConfig::new(method, options.threads)
+    };
     let mut engine = Engine::new(format, config);
     if let Some(gpu) = gpu {
         engine.use_gpu(gpu);
@@ -184,6 +192,8 @@ struct MethodRun {
     engine: Engine,
     newest: Option<u64>,
     outputs: Vec<ColorPlane>,
+    /// The picture of the key itself, where pictures are finished.
+    key_shown: Option<ColorPlane>,
     tally: MethodTally,
 }
 
@@ -199,6 +209,7 @@ impl MethodRun {
             engine: engine_of(method, gpu, format, options),
             newest: None,
             outputs: Vec::new(),
+            key_shown: (options.finish.mode != FinishMode::Off).then(ColorPlane::default),
             tally: MethodTally::new(method, options.ratio.get()),
         }
     }
@@ -216,6 +227,10 @@ impl MethodRun {
             self.push(next)?;
         }
         self.outputs.resize_with(times.len(), || ColorPlane::Rgba8(Plane::default()));
+        if let Some(shown) = &mut self.key_shown {
+            // The first picture of a key is the key.
+            self.engine.synthesise(key.content_time, shown).context("the engine has no key")?;
+        }
         for ((time, pose), output) in times.iter().zip(poses).zip(&mut self.outputs) {
             if let Some(view) = pose.filter(|_| self.method.knows_cameras()) {
                 self.engine.late_camera(*time, view);
@@ -247,12 +262,9 @@ struct TruthReader {
 
 impl TruthReader {
     fn new(format: StreamFormat, options: &ScoreOptions) -> Self {
-        let engine = engine_of(
-            Method::Hold,
-            options.backends.first().and_then(Option::as_ref),
-            format,
-            options,
-        );
+        let options = ScoreOptions { finish: FinishConfig::default(), ..options.clone() };
+        let gpu = options.backends.first().and_then(Option::as_ref);
+        let engine = engine_of(Method::Hold, gpu, format, &options);
         let converter = SrgbConverter::new(&format);
         Self { converter, engine, picture: ColorPlane::Rgba8(Plane::default()) }
     }

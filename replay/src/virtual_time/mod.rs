@@ -9,7 +9,9 @@ pub mod digest;
 pub mod keys;
 
 use foreframe_engine::backend::gpu::Gpu;
-use foreframe_engine::{ColorPlane, EngineConfig, Method, MonoSpan, MonoTime, Phase, StreamFormat};
+use foreframe_engine::{
+    ColorPlane, EngineConfig, FinishConfig, Method, MonoSpan, MonoTime, Phase, StreamFormat,
+};
 use foreframed::stream::core::{CoreConfig, FrameKind, FrameOutcome, PresentedFrame, StreamCore};
 use std::num::NonZeroUsize;
 use std::sync::Arc;
@@ -36,6 +38,8 @@ pub struct ReplayConfig {
     pub pixels_per_degree: Option<f32>,
     /// Poses that arrive after their keys, in the order of their arrival.
     pub late_cameras: Vec<TimedPose>,
+    /// Whether detail moves from in-between frames to their keys.
+    pub finish: FinishConfig,
 }
 
 /// Where an output frame comes from.
@@ -184,6 +188,7 @@ impl VirtualStream {
             &CoreConfig {
                 engine: EngineConfig {
                     pixels_per_degree: config.pixels_per_degree,
+                    finish: config.finish,
                     ..EngineConfig::new(config.method, config.threads)
                 },
                 refresh_interval,

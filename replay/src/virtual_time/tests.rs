@@ -56,6 +56,7 @@ fn replayed_plan(
         display_origin: None,
         pixels_per_degree: None,
         late_cameras: Vec::new(),
+        finish: FinishConfig::default(),
     };
     let mut digester = FrameDigester::default();
     let mut frames = Vec::new();
@@ -204,6 +205,7 @@ fn refreshes_lie_where_the_recording_says() {
             display_origin,
             pixels_per_degree: None,
             late_cameras: Vec::new(),
+            finish: FinishConfig::default(),
         };
         let keys = timed_keys(&mut recording, &reader, &plan, KeyTiming::AsRecorded);
         let mut shown = 0;
@@ -231,6 +233,7 @@ fn an_error_of_the_sink_ends_the_replay() {
         display_origin: None,
         pixels_per_degree: None,
         late_cameras: Vec::new(),
+        finish: FinishConfig::default(),
     };
     let keys = timed_keys(&mut recording, &reader, &plan, KeyTiming::Stepped);
     let result = replay(*reader.format(), &config, keys, |_, _| anyhow::bail!("disk full"));
@@ -261,6 +264,7 @@ fn what_is_repeated_is_the_picture_that_was_shown_and_not_one_that_was_dropped()
         display_origin: None,
         pixels_per_degree: None,
         late_cameras: Vec::new(),
+        finish: FinishConfig::default(),
     };
     let keys = timed_keys(&mut recording, &reader, &plan, KeyTiming::Stepped);
     let keys: Vec<_> = keys.map(Result::unwrap).take(2).collect();

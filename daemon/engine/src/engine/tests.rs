@@ -184,3 +184,32 @@ mod on_gpus {
         }
     }
 }
+
+#[test]
+fn finishing_is_off_by_default_and_on_it_shares_the_light_of_a_key_among_its_frames() {
+    use crate::finish::{FinishConfig, FinishMode};
+    let with = |mode| {
+        let finish = FinishConfig { mode, ..FinishConfig::default() };
+        let config = EngineConfig { finish, ..EngineConfig::new(Method::Hold, NonZeroUsize::MIN) };
+        let mut engine = Engine::new(format(), config);
+        let alternates = engine.alternates();
+        let frames: Vec<_> = (0..3)
+            .flat_map(|key| {
+                push(&mut engine, 25 * (key + 1), 0).unwrap();
+                [0, 8].map(|later| frame(&mut engine, 25 * (key + 1) + later))
+            })
+            .collect();
+        (frames, alternates)
+    };
+    let ((off, off_alternates), (on, on_alternates)) =
+        (with(FinishMode::Off), with(FinishMode::On));
+    assert!(!off_alternates && on_alternates);
+    assert!(off.iter().all(|frame| *frame == off[0]));
+    assert_eq!(on[..2], off[..2], "nobody knows yet how many frames a key has");
+    assert_ne!(on[2], on[3]);
+    assert_eq!((&on[4], &on[5]), (&on[2], &on[3]), "key and in-between frame, in turn");
+    for ((key, between), original) in on[2].iter().zip(&on[3]).zip(&off[2]) {
+        let ends = [key.min(between), key.max(between)];
+        assert!((ends[0]..=ends[1]).contains(&original), "{original} of {key} and {between}");
+    }
+}

@@ -7,12 +7,18 @@ use crate::display::{DisplayProfile, GainOffsetGamma};
 /// up to a gamma of 2.4.
 pub const FULL_LIGHT: u32 = 1 << 24;
 
+/// Bits of light that [`LightTable::level`] leaves to its search.
+const START_SHIFT: u32 = 16;
+
 /// One channel of a display: levels to light above black, and the level nearest to a light.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct LightTable {
     light: Vec<u32>,
-    /// Light of the codes half-way between levels, which is where the nearest level changes.
+    /// Light of the codes half-way between levels, which is where the nearest level changes. Levels
+    /// that give full light as the one before them does are never the nearest: `u32::MAX`.
     borders: Vec<u32>,
+    /// How many borders are at or below each multiple of `1 << START_SHIFT`, and then all.
+    starts: Vec<u16>,
 }
 
 impl LightTable {
@@ -29,11 +35,20 @@ impl LightTable {
             (share * f64::from(FULL_LIGHT)).round() as u32
         };
         let table: Vec<u32> = (0..levels).map(|level| quantised(f64::from(level))).collect();
-        let borders = (1..levels).map(|level| quantised(f64::from(level) - 0.5)).collect();
+        let most = table[table.len() - 1];
+        let border = |level: u32| {
+            let is_above = table[level as usize - 1] < most;
+            if is_above { quantised(f64::from(level) - 0.5) } else { u32::MAX }
+        };
+        let borders: Vec<u32> = (1..levels).map(border).collect();
         let rises = table.is_sorted() && table[0] < table[table.len() - 1];
         let last = f64::from(table[table.len() - 1]);
         PerceptionError::check("light of the last level", "more than of those below", last, rises)?;
-        Ok(Self { light: table, borders })
+        let below = |light: u32| borders.partition_point(|&border| border <= light);
+        let starts = (0..FULL_LIGHT >> START_SHIFT).map(|start| below(start << START_SHIFT));
+        let all = borders.len() - borders.iter().rev().take_while(|&&b| b > FULL_LIGHT).count();
+        let starts = starts.chain([all, all]).map(|count| count as u16).collect();
+        Ok(Self { light: table, borders, starts })
     }
 
     /// Red, green and blue of a measured display, `levels` levels each.
@@ -69,8 +84,18 @@ impl LightTable {
     /// The level whose code is nearest to that of a light.
     #[must_use]
     pub fn level(&self, light: u64) -> u16 {
-        let below = self.borders.partition_point(|&border| u64::from(border) <= light);
-        u16::try_from(below).expect("at most 65535 borders")
+        let light = u32::try_from(light).map_or(FULL_LIGHT, |light| light.min(FULL_LIGHT));
+        let start = (light >> START_SHIFT) as usize;
+        let [first, end] = [self.starts[start], self.starts[start + 1]].map(usize::from);
+        let further = self.borders[first..end].partition_point(|&border| border <= light);
+        u16::try_from(first + further).expect("at most 65535 borders")
+    }
+
+    /// The light of each level, and the light from which on each level but the first is the
+    /// nearest: what [`Self::light`] and [`Self::level`] look up. For shaders.
+    #[must_use]
+    pub fn words(&self) -> [&[u32]; 2] {
+        [&self.light, &self.borders]
     }
 
     /// The largest error of light that rounding to a level makes at `level`: half a level up or
@@ -79,8 +104,10 @@ impl LightTable {
     pub fn half_level(&self, level: u16) -> u32 {
         let level = level.min(self.last_level());
         let here = self.light(level);
-        let above = self.borders.get(usize::from(level)).map_or(0, |border| border - here);
-        let below = usize::from(level).checked_sub(1).map_or(0, |index| here - self.borders[index]);
+        let border = self.borders.get(usize::from(level)).filter(|&&border| border <= FULL_LIGHT);
+        let above = border.map_or(0, |border| border - here);
+        let border = usize::from(level).checked_sub(1).map(|index| self.borders[index]);
+        let below = border.filter(|&border| border <= here).map_or(0, |border| here - border);
         above.max(below)
     }
 }
@@ -113,6 +140,28 @@ mod tests {
         assert_eq!(table.level(u64::MAX), 255);
         assert_eq!((table.light(255), table.light(9999)), (FULL_LIGHT, FULL_LIGHT));
         assert!(table.half_level(100) >= table.light(100) - light(99.5) as u32 - 1);
+    }
+
+    #[test]
+    fn light_is_found_as_if_every_border_were_looked_at() {
+        for levels in [2, 17, 256, 1024, 65_536] {
+            for exponent in [1.0, 2.2, 7.0] {
+                let table = LightTable::new(levels, |code| libm::pow(code, exponent)).unwrap();
+                for step in 0..=5000_u32 {
+                    let light = (u64::from(step) * u64::from(FULL_LIGHT) / 5000) as u32;
+                    let expected = table.borders.iter().filter(|&&border| border <= light).count();
+                    assert_eq!(usize::from(table.level(light.into())), expected, "{light}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn of_levels_that_all_give_full_light_the_first_is_taken() {
+        let table = LightTable::new(256, |code| (code * 2.0).min(1.0)).unwrap();
+        assert_eq!(table.level(u64::MAX), 128);
+        assert_eq!(table.level(FULL_LIGHT.into()), 128);
+        assert_eq!(table.half_level(255), 0);
     }
 
     #[test]

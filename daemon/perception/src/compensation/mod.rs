@@ -8,6 +8,9 @@
 //! What the key cannot show goes back to the in-between frames, both ways. The paper keeps the
 //! original in the in-between frames where it is darker than its blur; giving them exactly what the
 //! key cannot take is less sharp there and loses no light.
+//!
+//! Key and in-between frames may be kept from differing by more than a given light: then the blur is
+//! what gives way, and the light of all frames stays as it is.
 
 mod light_table;
 
@@ -32,6 +35,7 @@ pub struct Split {
 pub struct Compensation {
     table: LightTable,
     frames: u32,
+    most_step: u32,
 }
 
 impl Compensation {
@@ -42,7 +46,14 @@ impl Compensation {
     pub fn new(table: LightTable, frames: u32) -> Result<Self, PerceptionError> {
         let is_inside = (2..=MOST_FRAMES).contains(&frames);
         PerceptionError::check("frames per key", "2 to 16", frames.into(), is_inside)?;
-        Ok(Self { table, frames })
+        Ok(Self { table, frames, most_step: FULL_LIGHT })
+    }
+
+    /// The same, where key and in-between frames differ by at most `difference` of [`FULL_LIGHT`].
+    #[must_use]
+    pub fn within(self, difference: u32) -> Self {
+        // The key is off by N - 1 times as much as each in-between frame, the other way.
+        Self { most_step: difference / self.frames, ..self }
     }
 
     /// The light of each level.
@@ -63,21 +74,62 @@ impl Compensation {
     /// The light of all frames is that of N originals to within half a level per frame.
     #[must_use]
     pub fn split(&self, original: u16, blurred: u16) -> Split {
-        let others = u64::from(self.frames - 1);
-        let full = u64::from(FULL_LIGHT);
-        let total = u64::from(self.frames) * u64::from(self.table.light(original));
-        let wanted = others * u64::from(self.table.light(blurred));
-        let in_between = if wanted > total {
-            // Undershoot: the key would have to be darker than black.
-            self.table.level(rounded(total, others))
-        } else if total - wanted > full {
-            // Overshoot: the key would have to be brighter than white.
-            self.table.level(rounded(total - full, others))
+        let [original, blurred] =
+            [original, blurred].map(|level| level.min(self.table.last_level()));
+        let in_between = self.in_between(original, blurred);
+        Split { key: self.key(original, in_between), in_between }
+    }
+
+    /// The least and the most light of in-between frames over `original`.
+    ///
+    /// Less would need a key brighter than white, more one darker than black.
+    #[must_use]
+    pub fn lights(&self, original: u16) -> [u32; 2] {
+        let light = self.table.light(original);
+        let others = self.frames - 1;
+        let total = self.frames * light;
+        let least = rounded(total.saturating_sub(FULL_LIGHT), others);
+        let most = rounded(total, others).min(FULL_LIGHT);
+        [least.max(light.saturating_sub(self.most_step)), most.min(light + self.most_step)]
+    }
+
+    /// The level of in-between frames: `blurred`, or the end of what [`Self::lights`] allows.
+    #[must_use]
+    pub fn in_between(&self, original: u16, blurred: u16) -> u16 {
+        let [least, most] = self.lights(original);
+        let wanted = self.table.light(blurred);
+        if wanted > most {
+            self.table.level(most.into())
+        } else if wanted < least {
+            self.table.level(least.into())
         } else {
-            blurred.min(self.table.last_level())
-        };
-        let left = total.saturating_sub(others * u64::from(self.table.light(in_between)));
-        Split { key: self.table.level(left.min(full)), in_between }
+            blurred
+        }
+    }
+
+    /// The level of in-between frames where no key has to make up for them: they differ from a key
+    /// no more than they may, and are else as blurred as is wanted.
+    #[must_use]
+    pub fn uncompensated(&self, original: u16, blurred: u16) -> u16 {
+        let light = self.table.light(original);
+        let wanted = self.table.light(blurred);
+        let [least, most] = [light.saturating_sub(self.most_step), light + self.most_step];
+        if (least..=most).contains(&wanted) {
+            blurred
+        } else {
+            self.table.level(wanted.clamp(least, most).into())
+        }
+    }
+
+    /// The level of the key whose in-between frames show `in_between`: itself where they do.
+    #[must_use]
+    pub fn key(&self, original: u16, in_between: u16) -> u16 {
+        if in_between == original {
+            return original;
+        }
+        let total = self.frames * self.table.light(original);
+        let left = total.saturating_sub((self.frames - 1) * self.table.light(in_between));
+        self.table.level(left.min(FULL_LIGHT).into())
     }
 
     /// All splits of 8-bit levels: entry `original * 256 + blurred` is the key's and the in-between
@@ -98,7 +150,7 @@ impl Compensation {
     }
 }
 
-fn rounded(dividend: u64, divisor: u64) -> u64 {
+fn rounded(dividend: u32, divisor: u32) -> u32 {
     (dividend + divisor / 2) / divisor
 }
 

@@ -111,6 +111,41 @@ fn the_table_of_bytes_holds_every_split() {
 }
 
 #[test]
+fn frames_that_may_not_differ_by_more_keep_to_it_and_to_their_light() {
+    let table = LightTable::new(256, |code| libm::pow(code, 2.2)).unwrap();
+    for frames in [2, 3, 5] {
+        let free = Compensation::new(table.clone(), frames).unwrap();
+        for most in [FULL_LIGHT / 1000, FULL_LIGHT / 20, FULL_LIGHT / 3] {
+            let kept = free.clone().within(most);
+            let mut held_back = 0;
+            for original in 0..=255 {
+                for blurred in 0..=255 {
+                    let split = kept.split(original, blurred);
+                    let light = |level| i64::from(table.light(level));
+                    let apart = (light(split.key) - light(split.in_between)).abs();
+                    assert!(apart <= i64::from(most) + allowed(&kept, split) * i64::from(frames));
+                    assert!(excess(&kept, original, split).abs() <= allowed(&kept, split));
+                    held_back += u32::from(split != free.split(original, blurred));
+                }
+            }
+            assert!(held_back > 5000, "{held_back} of pairs for {most}");
+        }
+        assert_eq!(free.clone().within(FULL_LIGHT * 16).split(3, 200), free.split(3, 200));
+        let none = free.clone().within(0);
+        assert_eq!(none.split(40, 200), Split { key: 40, in_between: 40 });
+    }
+}
+
+#[test]
+fn what_no_key_makes_up_for_is_as_blurred_as_is_wanted_within_the_limit() {
+    let table = LightTable::new(256, |code| libm::pow(code, 2.2)).unwrap();
+    let free = Compensation::new(table, 3).unwrap();
+    assert_eq!((free.uncompensated(0, 200), free.in_between(0, 200)), (200, 0));
+    let kept = free.within(FULL_LIGHT / 10);
+    assert!((1..200).contains(&kept.uncompensated(0, 200)));
+}
+
+#[test]
 fn other_numbers_of_frames_are_refused() {
     let table = LightTable::new(256, |code| code).unwrap();
     assert!(Compensation::new(table.clone(), 1).is_err());

@@ -76,6 +76,30 @@ impl FlickerModel {
         probability(contrast * seen, SLOPE)
     }
 
+    /// The largest difference of luminance, cd/m2, between frames that fewer than half of the viewers
+    /// see, whatever the luminance around which they alternate, where each band of the difference
+    /// has at most the share `gain(cpd)` of it, 0 to 1.
+    ///
+    /// The mean of two frames is at least half of their difference, and sensitivity grows more
+    /// slowly than luminance, so that a difference is seen best at that mean, with a contrast of 1.
+    #[must_use]
+    pub fn unseen_difference(&self, gain: impl Fn(f64) -> f64) -> f64 {
+        let bands = Bands::frequencies(self.ppd);
+        bands.fold(f64::INFINITY, |least, cpd| least.min(self.unseen(cpd, gain(cpd))))
+    }
+
+    /// The same for a difference that is all in one band of `cpd`.
+    #[must_use]
+    pub fn unseen_difference_of(&self, cpd: f64) -> f64 {
+        self.unseen(cpd, 1.0)
+    }
+
+    fn unseen(&self, cpd: f64, gain: f64) -> f64 {
+        let of_one = gain * self.sensitivity.sensitivity(self.flicker_hz(), cpd, 1.0);
+        let mean = libm::pow(of_one, -1.0 / self.sensitivity.per_log_luminance);
+        2.0 * mean
+    }
+
     /// Probability of detection in each pixel when `first` and `second` alternate, both luminance
     /// in cd/m2 (equations 7.1 to 7.7). Where there is no light at all it is 0.
     ///

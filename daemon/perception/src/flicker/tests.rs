@@ -172,3 +172,26 @@ fn the_display_of_the_stimuli_is_close_to_the_measured_profile() {
         assert!((measured - f64::from(light(code))).abs() < 0.015, "{code}: {measured}");
     }
 }
+
+#[test]
+fn a_difference_below_the_unseen_one_is_below_threshold_around_every_luminance() {
+    for (rate, frames) in [(120.0, 3), (120.0, 2), (90.0, 2), (60.0, 2)] {
+        let model = model(rate).repeating_after(frames).unwrap();
+        let unseen = model.unseen_difference(|_| 1.0);
+        let mut highest: f64 = 0.0;
+        for step in 0..200 {
+            let mean = unseen / 2.0 * libm::pow(1.02, f64::from(step));
+            for cpd in Bands::frequencies(PPD) {
+                highest = highest.max(model.of_contrast(unseen / (2.0 * mean), cpd, mean));
+            }
+        }
+        assert!((highest - 0.5).abs() < 1e-9, "{highest}: {unseen} cd/m2 at {rate} Hz");
+        // The lowest band, of 1.625 cpd, is the one that is seen best.
+        let of_lowest = model.unseen_difference_of(1.625);
+        assert!((of_lowest - unseen).abs() < 1e-9);
+        assert!(model.unseen_difference(|cpd| if cpd < 6.0 { 0.1 } else { 1.0 }) > unseen);
+    }
+    let [slow, fast] = [3, 2]
+        .map(|frames| model(120.0).repeating_after(frames).unwrap().unseen_difference(|_| 1.0));
+    assert!(slow > 10.0 && slow < 40.0 && fast > 5.0 * slow, "{slow} {fast}");
+}

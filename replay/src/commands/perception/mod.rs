@@ -12,11 +12,9 @@ mod retina;
 mod schedule;
 mod window;
 
-use std::fs;
-
 use anyhow::Context as _;
-use foreframe_perception::display::DisplayProfile;
 use foreframe_perception::motion_quality::Motion;
+use foreframed::config::read_profile;
 use image::RgbImage;
 
 use super::plot;
@@ -83,15 +81,6 @@ impl From<MotionName> for Motion {
             MotionName::Unpredictable => Self::Unpredictable,
         }
     }
-}
-
-/// A built-in profile by its name, or a profile from a file whose name ends in `.toml`.
-fn read_profile(name: &str) -> anyhow::Result<DisplayProfile> {
-    if !name.ends_with(".toml") {
-        return Ok(DisplayProfile::builtin(name)?);
-    }
-    let text = fs::read_to_string(name).with_context(|| format!("reading {name}"))?;
-    DisplayProfile::parse(&text).with_context(|| format!("reading {name}"))
 }
 
 /// The picture in a PNG, alpha left out.

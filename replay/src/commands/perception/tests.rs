@@ -1,5 +1,7 @@
 //! Every model is asked through the command line, with the fixed names of its JSON.
 
+use std::fs;
+
 use clap::{CommandFactory as _, Parser as _};
 use image::Rgb;
 

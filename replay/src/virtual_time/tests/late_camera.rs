@@ -28,6 +28,7 @@ fn shown(late_cameras: Vec<TimedPose>, threads: usize) -> Vec<(OutputFrame, Stri
         refresh_interval: MonoSpan::from_hz(120.0),
         display_origin: None,
         pixels_per_degree: None,
+        finish: FinishConfig::default(),
         late_cameras,
     };
     let keys = timed_keys(&mut recording, &reader, &plan, KeyTiming::AsRecorded).map(|key| {

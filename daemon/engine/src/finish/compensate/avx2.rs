@@ -1,0 +1,210 @@
+//! Eight `rgba8` pixels at a time.
+//!
+//! The blur of a row comes from sums of 16 bits, four pixels of the coarse level in a register. Of
+//! in-between frames most pixels lie within the room of their sixteenth, where (2) of [`super`] is
+//! the blur itself; where one of eight does not, and for keys where a pixel differs from its blur,
+//! the tables are looked up. The caller asks the processor whether it has AVX2.
+
+use std::arch::x86_64::{
+    __m256i, _mm256_add_epi16, _mm256_and_si256, _mm256_andnot_si256, _mm256_cmpeq_epi32,
+    _mm256_i32gather_epi32, _mm256_loadu_si256, _mm256_max_epu8, _mm256_min_epu8,
+    _mm256_movemask_epi8, _mm256_or_si256, _mm256_packus_epi16, _mm256_set1_epi8,
+    _mm256_set1_epi16, _mm256_set1_epi32, _mm256_setr_epi8, _mm256_shuffle_epi8, _mm256_slli_epi16,
+    _mm256_slli_epi32, _mm256_srli_epi16, _mm256_srli_epi32, _mm256_storeu_si256, _mm256_subs_epu8,
+    _mm256_testz_si256, _mm256_unpackhi_epi64, _mm256_unpacklo_epi64,
+};
+
+use crate::color::Rgba8;
+use crate::finish::lanes::Wide;
+use crate::finish::pyramid::Expanded;
+use crate::finish::shares::ByteTables;
+
+/// Pixels of one step.
+const LANES: usize = 8;
+
+/// (2) or (3) of a row, as many pixels as whole steps hold; returns their number.
+#[target_feature(enable = "avx2")]
+pub(super) fn row(
+    tables: &ByteTables,
+    is_key: bool,
+    blurred: &Expanded<'_, <Rgba8 as Wide>::Lanes>,
+    row: &mut [Rgba8],
+) -> usize {
+    let count = row.len() / LANES;
+    // A step reads six columns of the coarse level from the fourth part of it on.
+    assert!(blurred.sums.len() >= 4 * count + 2, "a coarse level covers the fine one");
+    let room = Room::new(tables);
+    for (step, texels) in row.chunks_exact_mut(LANES).enumerate() {
+        // SAFETY: there are 8 pixels of 4 bytes, and the load needs no alignment.
+        let original = unsafe { _mm256_loadu_si256(texels.as_ptr().cast()) };
+        // SAFETY: sums 4 * step to 4 * step + 5 are there, asserted above.
+        let blur = unsafe { blur(blurred.sums.as_ptr().add(4 * step).cast()) };
+        let made =
+            if is_key { key(tables, original, blur) } else { room.between(tables, original, blur) };
+        // SAFETY: there are 8 pixels of 4 bytes, and the store needs no alignment.
+        unsafe { _mm256_storeu_si256(texels.as_mut_ptr().cast(), made) };
+    }
+    count * LANES
+}
+
+/// The blur of eight pixels.
+///
+/// # Safety
+/// Six words can be read from `sums` on.
+#[inline]
+#[target_feature(enable = "avx2")]
+unsafe fn blur(sums: *const u64) -> __m256i {
+    // SAFETY: by the contract, the words 0 to 5 can be read, and loads need no alignment.
+    let [before, here, after] =
+        unsafe { [sums, sums.add(1), sums.add(2)].map(|sums| _mm256_loadu_si256(sums.cast())) };
+    let half = _mm256_set1_epi16(32);
+    let here_4 = _mm256_slli_epi16(here, 2);
+    let here_6 = _mm256_add_epi16(here_4, _mm256_slli_epi16(here, 1));
+    let even = _mm256_add_epi16(_mm256_add_epi16(before, here_6), after);
+    let odd = _mm256_add_epi16(here_4, _mm256_slli_epi16(after, 2));
+    let even = _mm256_srli_epi16(_mm256_add_epi16(even, half), 6);
+    let odd = _mm256_srli_epi16(_mm256_add_epi16(odd, half), 6);
+    // Pixels 0 1 | 4 5 and 2 3 | 6 7 become 0 1 2 3 | 4 5 6 7.
+    let low = _mm256_unpacklo_epi64(even, odd);
+    let high = _mm256_unpackhi_epi64(even, odd);
+    _mm256_packus_epi16(low, high)
+}
+
+/// How far the blur may lie from the original before a table has to be asked.
+struct Room {
+    above: __m256i,
+    below: __m256i,
+}
+
+impl Room {
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn new(tables: &ByteTables) -> Self {
+        let [above, below] = tables.room.map(|room| {
+            let twice = [room, room];
+            // SAFETY: there are twice 16 bytes, and the load needs no alignment.
+            unsafe { _mm256_loadu_si256(twice.as_ptr().cast()) }
+        });
+        Self { above, below }
+    }
+
+    /// (2)
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn between(&self, tables: &ByteTables, original: __m256i, blur: __m256i) -> __m256i {
+        let alpha = _mm256_set1_epi32(0xff00_0000_u32.cast_signed());
+        let blur =
+            _mm256_or_si256(_mm256_and_si256(alpha, original), _mm256_andnot_si256(alpha, blur));
+        let sixteenth = _mm256_and_si256(_mm256_srli_epi16(original, 4), _mm256_set1_epi8(15));
+        let above = _mm256_shuffle_epi8(self.above, sixteenth);
+        let below = _mm256_shuffle_epi8(self.below, sixteenth);
+        let beyond = _mm256_or_si256(
+            _mm256_subs_epu8(_mm256_subs_epu8(blur, original), above),
+            _mm256_subs_epu8(_mm256_subs_epu8(original, blur), below),
+        );
+        if _mm256_testz_si256(beyond, beyond) == 1 {
+            return blur;
+        }
+        let (mut low, mut high) =
+            (_mm256_and_si256(alpha, original), _mm256_and_si256(alpha, original));
+        for (channel, shift) in [0, 8, 16].into_iter().enumerate() {
+            let level = match shift {
+                0 => original,
+                8 => _mm256_srli_epi32(original, 8),
+                _ => _mm256_srli_epi32(original, 16),
+            };
+            let index = _mm256_and_si256(level, _mm256_set1_epi32(0xff));
+            let within = tables.within[channel].as_ptr().cast();
+            // SAFETY: an index has 8 bits, and there are 256 entries of 4 bytes.
+            let ends = unsafe { _mm256_i32gather_epi32::<4>(within, index) };
+            let first = _mm256_and_si256(ends, _mm256_set1_epi32(0xff));
+            let last = _mm256_srli_epi32(ends, 8);
+            let place = |level| match shift {
+                0 => level,
+                8 => _mm256_slli_epi32(level, 8),
+                _ => _mm256_slli_epi32(level, 16),
+            };
+            low = _mm256_or_si256(low, place(first));
+            high = _mm256_or_si256(high, place(last));
+        }
+        _mm256_min_epu8(_mm256_max_epu8(blur, low), high)
+    }
+}
+
+/// (3)
+#[inline]
+#[target_feature(enable = "avx2")]
+fn key(tables: &ByteTables, original: __m256i, blur: __m256i) -> __m256i {
+    let alpha = _mm256_set1_epi32(0xff00_0000_u32.cast_signed());
+    let same =
+        _mm256_cmpeq_epi32(_mm256_andnot_si256(alpha, original), _mm256_andnot_si256(alpha, blur));
+    if _mm256_movemask_epi8(same) == -1 {
+        return original;
+    }
+    // Of each channel the original in the upper byte of 16 bits and the blur in the lower.
+    let red = _mm256_shuffle_epi8(original, spread(0));
+    let green = _mm256_shuffle_epi8(original, spread(1));
+    let blue = _mm256_shuffle_epi8(original, spread(2));
+    let mut made = _mm256_and_si256(alpha, original);
+    for (channel, original) in [red, green, blue].into_iter().enumerate() {
+        let byte = _mm256_set1_epi32(0xff);
+        let (level, blurred) = match channel {
+            0 => (original, _mm256_and_si256(blur, byte)),
+            1 => (original, _mm256_and_si256(_mm256_srli_epi32(blur, 8), byte)),
+            _ => (original, _mm256_and_si256(_mm256_srli_epi32(blur, 16), byte)),
+        };
+        let index = _mm256_or_si256(level, blurred);
+        let key = tables.key[channel].as_ptr().cast();
+        // SAFETY: an index has 16 bits, and there are 3 bytes behind the entry of the largest.
+        let found = unsafe { _mm256_i32gather_epi32::<1>(key, index) };
+        let found = _mm256_and_si256(found, byte);
+        let found = match channel {
+            0 => found,
+            1 => _mm256_slli_epi32(found, 8),
+            _ => _mm256_slli_epi32(found, 16),
+        };
+        made = _mm256_or_si256(made, found);
+    }
+    made
+}
+
+/// The shuffle that moves byte `channel` of each pixel to the second byte, alone.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn spread(channel: i8) -> __m256i {
+    let at = |pixel: i8| 4 * pixel + channel;
+    _mm256_setr_epi8(
+        -1,
+        at(0),
+        -1,
+        -1,
+        -1,
+        at(1),
+        -1,
+        -1,
+        -1,
+        at(2),
+        -1,
+        -1,
+        -1,
+        at(3),
+        -1,
+        -1,
+        -1,
+        at(0),
+        -1,
+        -1,
+        -1,
+        at(1),
+        -1,
+        -1,
+        -1,
+        at(2),
+        -1,
+        -1,
+        -1,
+        at(3),
+        -1,
+        -1,
+    )
+}

@@ -1,0 +1,150 @@
+//! The reference of [`super`].
+
+use rayon::ThreadPool;
+
+#[cfg(target_arch = "x86_64")]
+use super::avx2;
+use crate::bands::for_each_row;
+use crate::color::{ColorPlane, Rgba8};
+use crate::finish::lanes::Wide;
+use crate::finish::pyramid::{Expanded, Pyramid, up_rows};
+use crate::finish::shares::{ByteTables, Split};
+use crate::plane::{Plane, Rect};
+#[cfg(target_arch = "x86_64")]
+use crate::simd::has_avx2;
+
+/// (2) or (3) of the part `valid` of `picture`, whose levels are `pyramid`.
+pub fn compensate(
+    pool: &ThreadPool,
+    split: &Split<'_>,
+    valid: Rect,
+    pyramid: &Pyramid,
+    picture: &mut ColorPlane,
+) {
+    match (&pyramid.smooth, picture) {
+        (ColorPlane::Rgba8(smooth), ColorPlane::Rgba8(picture)) => {
+            bytes(pool, split, valid, smooth, picture);
+        }
+        (ColorPlane::Rgb10a2(smooth), ColorPlane::Rgb10a2(picture)) => {
+            channels(pool, split, valid, smooth, picture);
+        }
+        (ColorPlane::Rgba16f(smooth), ColorPlane::Rgba16f(picture)) => {
+            channels(pool, split, valid, smooth, picture);
+        }
+        _ => unreachable!("the pyramid has the format of the picture"),
+    }
+}
+
+fn bytes(
+    pool: &ThreadPool,
+    split: &Split<'_>,
+    valid: Rect,
+    smooth: &Plane<Rgba8>,
+    picture: &mut Plane<Rgba8>,
+) {
+    let Some(tables) = &split.tables.bytes else {
+        return channels(pool, split, valid, smooth, picture);
+    };
+    for_each_valid_row(
+        pool,
+        valid,
+        picture,
+        #[inline(always)]
+        |y, row| {
+            up_rows(
+                smooth,
+                y,
+                #[inline(always)]
+                |blurred: Expanded<'_, <Rgba8 as Wide>::Lanes>| {
+                    let mut done = 0;
+                    #[cfg(target_arch = "x86_64")]
+                    if has_avx2() {
+                        // SAFETY: the processor has AVX2, asked for just above.
+                        done = unsafe { avx2::row(tables, split.is_key, &blurred, row) };
+                    }
+                    for (x, texel) in row.iter_mut().enumerate().skip(done) {
+                        let blurred = Rgba8::narrow(blurred.at(x));
+                        *texel = tables.of(split.is_key, *texel, blurred);
+                    }
+                },
+            );
+        },
+    );
+}
+
+fn channels<T: Wide>(
+    pool: &ThreadPool,
+    split: &Split<'_>,
+    valid: Rect,
+    smooth: &Plane<T>,
+    picture: &mut Plane<T>,
+) {
+    for_each_valid_row(
+        pool,
+        valid,
+        picture,
+        #[inline(always)]
+        |y, row| {
+            up_rows(
+                smooth,
+                y,
+                #[inline(always)]
+                |blurred: Expanded<'_, T::Lanes>| {
+                    for (x, texel) in row.iter_mut().enumerate() {
+                        let blurred = T::narrow(blurred.at(x));
+                        *texel = split.of(*texel, blurred);
+                    }
+                },
+            );
+        },
+    );
+}
+
+/// Calls `inside(row, pixels)` for every row of the part `valid` of `picture`, counted from its top.
+fn for_each_valid_row<T: Wide>(
+    pool: &ThreadPool,
+    valid: Rect,
+    picture: &mut Plane<T>,
+    inside: impl Fn(u32, &mut [T]) + Sync,
+) {
+    for_each_row(
+        pool,
+        picture,
+        #[inline(always)]
+        |y, row| {
+            if (valid.y..valid.y + valid.height).contains(&y) {
+                let (left, right) = (valid.x as usize, (valid.x + valid.width) as usize);
+                inside(y - valid.y, &mut row[left..right]);
+            }
+        },
+    );
+}
+
+impl Split<'_> {
+    /// What a pixel becomes, by definition.
+    pub(in crate::finish) fn of<T: Wide>(&self, original: T, blurred: T) -> T {
+        let (mut levels, blurred) = (original.channels(), blurred.channels());
+        for (channel, table) in self.tables.channels.iter().enumerate() {
+            let split = table.split(levels[channel], blurred[channel]);
+            levels[channel] = if self.is_key { split.key } else { split.in_between };
+        }
+        T::of_channels(levels)
+    }
+}
+
+impl ByteTables {
+    /// What a pixel becomes, by the tables.
+    pub(in crate::finish) fn of(&self, is_key: bool, original: Rgba8, blurred: Rgba8) -> Rgba8 {
+        let (mut levels, blurred) = (original.channels(), blurred.channels());
+        for channel in 0..3 {
+            let [level, blurred] = [levels[channel], blurred[channel]].map(usize::from);
+            levels[channel] = if is_key {
+                self.key[channel][level * 256 + blurred].into()
+            } else {
+                let [low, high, ..] = self.within[channel][level].to_le_bytes().map(u16::from);
+                (blurred as u16).clamp(low, high)
+            };
+        }
+        Rgba8::of_channels(levels)
+    }
+}

@@ -1,0 +1,218 @@
+//! The channels of a pixel, wide enough to be added up.
+//!
+//! A pixel of four bytes becomes one word with 16 bits for each channel: 64 of its largest values
+//! and a rounding still fit, at 8 and at 10 bits. Halves take 32 bits a channel.
+
+use std::cell::RefCell;
+use std::ops::{Add, Shl};
+
+use crate::color::{OrderedRgba16, Rgb10a2, Rgba8, Texel};
+
+/// A sum of the channels of up to 64 pixels.
+pub(super) trait Lanes:
+    Copy + Default + Send + Sync + Add<Output = Self> + Shl<u32, Output = Self>
+{
+    /// Each channel plus half, shifted down, which leaves a channel of one pixel. Bits above that
+    /// are not defined; [`Wide::narrow`] passes over them.
+    fn rounded(self, shift: u32) -> Self;
+
+    /// Calls `work` with a row of the thread, kept from row to row, whatever it holds.
+    fn with_row(work: impl FnOnce(&mut Vec<Self>));
+}
+
+/// The body of [`Lanes::with_row`].
+///
+/// Taken and put back, as a closure given to the thread's storage is not made for AVX2.
+macro_rules! with_row {
+    ($lanes:ty) => {
+        #[inline(always)]
+        fn with_row(work: impl FnOnce(&mut Vec<Self>)) {
+            thread_local! {
+                static ROW: RefCell<Vec<$lanes>> = const { RefCell::new(Vec::new()) };
+            }
+            let mut row = ROW.take();
+            work(&mut row);
+            ROW.set(row);
+        }
+    };
+}
+
+/// A pixel that can be added up.
+pub(super) trait Wide: Texel {
+    type Lanes: Lanes;
+
+    fn widen(self) -> Self::Lanes;
+    fn narrow(lanes: Self::Lanes) -> Self;
+    /// Red, green, blue, alpha.
+    fn channels(self) -> [u16; 4];
+    fn of_channels(channels: [u16; 4]) -> Self;
+}
+
+/// Four channels of 16 bits, red lowest.
+#[derive(Clone, Copy, Default)]
+#[repr(transparent)]
+pub(super) struct Packed(u64);
+
+const BYTES: u64 = 0x00ff_00ff_00ff_00ff;
+const ONES: u64 = 0x0001_0001_0001_0001;
+
+impl Add for Packed {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self(self.0.wrapping_add(other.0))
+    }
+}
+
+impl Shl<u32> for Packed {
+    type Output = Self;
+
+    #[inline(always)]
+    fn shl(self, shift: u32) -> Self {
+        Self(self.0 << shift)
+    }
+}
+
+impl Lanes for Packed {
+    #[inline(always)]
+    fn rounded(self, shift: u32) -> Self {
+        Self(self.0.wrapping_add(ONES << (shift - 1)) >> shift)
+    }
+
+    with_row!(Packed);
+}
+
+impl Wide for Rgba8 {
+    type Lanes = Packed;
+
+    #[inline(always)]
+    fn widen(self) -> Self::Lanes {
+        let word = u64::from(self.0);
+        let pairs = (word | word << 16) & 0x0000_ffff_0000_ffff;
+        Packed((pairs | pairs << 8) & BYTES)
+    }
+
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "four bytes have come together below")]
+    fn narrow(Packed(lanes): Self::Lanes) -> Self {
+        let lanes = lanes & BYTES;
+        let pairs = (lanes | lanes >> 8) & 0x0000_ffff_0000_ffff;
+        Self((pairs | pairs >> 16) as u32)
+    }
+
+    #[inline(always)]
+    fn channels(self) -> [u16; 4] {
+        self.0.to_le_bytes().map(u16::from)
+    }
+
+    #[inline(always)]
+    fn of_channels(channels: [u16; 4]) -> Self {
+        let [r, g, b, a] = channels.map(u32::from);
+        Self(r | g << 8 | b << 16 | a << 24)
+    }
+}
+
+impl Wide for Rgb10a2 {
+    type Lanes = Packed;
+
+    #[inline(always)]
+    fn widen(self) -> Self::Lanes {
+        let [r, g, b, a] = self.channels().map(u64::from);
+        Packed(r | g << 16 | b << 32 | a << 48)
+    }
+
+    #[inline(always)]
+    fn narrow(Packed(lanes): Self::Lanes) -> Self {
+        let [r, g, b, a] = [0, 16, 32, 48].map(|shift| (lanes >> shift & 0x3ff) as u16);
+        Self::of_channels([r, g, b, a & 3])
+    }
+
+    #[inline(always)]
+    fn channels(self) -> [u16; 4] {
+        [0, 10, 20, 30].map(|shift| (self.0 >> shift & 0x3ff) as u16)
+    }
+
+    #[inline(always)]
+    fn of_channels(channels: [u16; 4]) -> Self {
+        let [r, g, b, a] = channels.map(u32::from);
+        Self(r | g << 10 | b << 20 | a << 30)
+    }
+}
+
+/// Four channels of 32 bits.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Quad([u32; 4]);
+
+impl Add for Quad {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, Self(other): Self) -> Self {
+        Self(std::array::from_fn(|channel| self.0[channel].wrapping_add(other[channel])))
+    }
+}
+
+impl Shl<u32> for Quad {
+    type Output = Self;
+
+    #[inline(always)]
+    fn shl(self, shift: u32) -> Self {
+        Self(self.0.map(|channel| channel << shift))
+    }
+}
+
+impl Lanes for Quad {
+    #[inline(always)]
+    fn rounded(self, shift: u32) -> Self {
+        Self(self.0.map(|channel| (channel + (1 << (shift - 1))) >> shift))
+    }
+
+    with_row!(Quad);
+}
+
+impl Wide for OrderedRgba16 {
+    type Lanes = Quad;
+
+    #[inline(always)]
+    fn widen(self) -> Self::Lanes {
+        Quad(self.0.map(u32::from))
+    }
+
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "a mean of 16 bits has 16 bits")]
+    fn narrow(Quad(lanes): Self::Lanes) -> Self {
+        Self(lanes.map(|channel| channel as u16))
+    }
+
+    #[inline(always)]
+    fn channels(self) -> [u16; 4] {
+        self.0
+    }
+
+    #[inline(always)]
+    fn of_channels(channels: [u16; 4]) -> Self {
+        Self(channels)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn is_kept<T: Wide + std::fmt::Debug>(texel: T) {
+        assert_eq!(T::narrow(texel.widen()), texel);
+        assert_eq!(T::of_channels(texel.channels()), texel);
+        let sum = (texel.widen() << 5) + (texel.widen() << 5);
+        assert_eq!(T::narrow(sum.rounded(6)), texel, "64 of one pixel are that pixel");
+    }
+
+    #[test]
+    fn pixels_come_back_and_64_of_the_brightest_fit() {
+        for word in [0, u32::MAX, 0x1234_5678, 0xff00_ff00, 0x0102_0304] {
+            is_kept(Rgba8(word));
+            is_kept(Rgb10a2(word));
+        }
+        is_kept(OrderedRgba16([u16::MAX, 0, 0x8000, 77]));
+    }
+}
