@@ -50,6 +50,10 @@ pub struct Args {
     /// seen.
     #[arg(long, default_value_t = FinishMode::Off)]
     pub finish: FinishMode,
+    /// Compare what an eye that follows the motion sees, too: of the frames, of the keys alone, and of
+    /// the true frames.
+    #[arg(long)]
+    pub retina: bool,
     /// Display that frames are finished for: a built-in profile (see `perception displays`) or a file
     /// that ends in .toml.
     #[arg(long, value_name = "NAME")]
@@ -78,6 +82,7 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
     let profile = args.profile.as_deref().map(read_profile).transpose()?;
     let refresh_interval = MonoSpan::from_hz(args.refresh);
     let options = ScoreOptions {
+        retina: args.retina,
         finish: FinishConfig::new(args.finish, profile.as_ref(), refresh_interval),
         methods: args.methods.0.clone(),
         ratio: args.ratio,

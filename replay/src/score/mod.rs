@@ -12,5 +12,6 @@ pub mod metrics;
 pub mod page;
 pub mod picture;
 pub mod report;
+pub mod retina;
 pub mod run;
 pub mod tally;

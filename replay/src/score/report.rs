@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::flips::FlipFrame;
 use super::metrics::TileClasses;
+use super::retina::RetinaScore;
 
 /// The whole result.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -88,6 +89,9 @@ pub struct MethodScore {
     pub ms_per_frame: Option<f64>,
     /// Work of the engine per key frame.
     pub ms_per_key: Option<f64>,
+    /// How close the frames come to the true ones on the retina, where that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub retina: Option<RetinaScore>,
     /// Every predicted frame, in order.
     #[serde(skip)]
     pub by_frame: Vec<FramePoint>,
@@ -169,6 +173,12 @@ impl Report {
             for method in &capture.methods {
                 push_line(&mut text, &(method_row(method) + &on(&self.backend, &method.backend)));
             }
+            if capture.methods.iter().any(|method| method.retina.is_some()) {
+                push_line(&mut text, RETINA_HEADER);
+                for method in &capture.methods {
+                    push_line(&mut text, &retina_row(method));
+                }
+            }
             push_line(&mut text, "");
         }
         if self.captures.len() > 1 {
@@ -190,6 +200,21 @@ impl Report {
 
 const HEADER: &str = "  method   frames    RGB      Y   SSIM   FLIP  worst  flicker  ms/frame  \
                       ms/key  Y by phase";
+
+const RETINA_HEADER: &str = "  on the retina  windows     RGB    SSIM  keys held: RGB    SSIM";
+
+fn retina_row(score: &MethodScore) -> String {
+    let windows = score.retina.map_or(0, |retina| retina.windows);
+    let value = |pick: fn(&RetinaScore) -> f64| score.retina.as_ref().map(pick);
+    format!(
+        "  {:<13} {windows:>8} {} {} {} {}",
+        score.name,
+        number(value(|retina| retina.psnr_rgb_db), 7, 2),
+        number(value(|retina| retina.ssim), 7, 4),
+        number(value(|retina| retina.keys_psnr_rgb_db), 15, 2),
+        number(value(|retina| retina.keys_ssim), 7, 4),
+    )
+}
 
 /// What a row ran on, where not all ran on the same.
 fn on(all: &str, backend: &str) -> String {
@@ -300,6 +325,7 @@ pub(super) mod tests {
             error_flicker: Some(0.8),
             ms_per_frame: Some(3.1),
             ms_per_key: Some(2.4),
+            retina: None,
             by_frame: Vec::new(),
         }
     }

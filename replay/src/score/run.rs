@@ -12,16 +12,19 @@ use std::sync::Arc;
 
 use anyhow::{Context as _, ensure};
 use foreframe_engine::backend::gpu::Gpu;
+use foreframe_engine::decode::decode_field;
 use foreframe_engine::{
     ColorPlane, Engine, EngineConfig, FinishConfig, FinishMode, Method, MonoTime, Plane,
     StreamFormat,
 };
 use foreframed::sink::srgb::SrgbConverter;
 use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::flips::FlipFrame;
 use super::picture::{Srgb8, to_srgb8};
 use super::report::{CaptureScore, MotionCounts};
+use super::retina::{Eye, closeness, gaze_of, reach};
 use super::tally::{FrameScore, MethodTally, Truth};
 use crate::recording::keys::KeyReader;
 use crate::recording::plan::{MotionSource, Plan};
@@ -44,6 +47,8 @@ pub struct ScoreOptions {
     pub kept_frames: usize,
     /// Whether detail moves from in-between frames to their keys, which are then made too.
     pub finish: FinishConfig,
+    /// Compares what the eye sees, too.
+    pub retina: bool,
     /// Tells methods that know cameras where the recording's is at the time of each frame.
     pub late_camera: bool,
 }
@@ -71,6 +76,7 @@ pub fn score_recording(
         .map(|(method, backend)| MethodRun::new(method, backend, format, options))
         .collect();
     let kept = kept_frames(&plan, options.kept_frames);
+    let mut retina = Retina::new(options)?;
     let mut flips = Vec::new();
 
     let mut key = reader.read(recording, &plan, 0)?;
@@ -87,7 +93,7 @@ pub fn score_recording(
             run.make(&key, next.as_ref(), &times, &poses)
                 .with_context(|| format!("key frame {}", plan.keys[index].frame))?;
         }
-        let truths: Vec<_> = predicted
+        let truths_of_key: Vec<_> = predicted
             .clone()
             .map(|frame| truths.read(recording, frame))
             .collect::<anyhow::Result<Vec<_>>>()?
@@ -100,11 +106,16 @@ pub fn score_recording(
             let frames: Vec<_> = run
                 .outputs
                 .par_iter()
-                .zip(&truths)
+                .zip(&truths_of_key)
                 .map(|(output, truth)| FrameScore::of(&to_srgb8(output, &converter), truth))
                 .collect();
             run.tally.add_frames(predicted.start, &frames, size, is_whole);
         });
+        if let Some(retina) = &mut retina {
+            let moment = Moment { plan: &plan, index, key: &key, truths: &truths_of_key };
+            retina.look(&moment, &format, &converter, &mut runs)?;
+        }
+        let truths = truths_of_key;
         for (place, frame) in predicted.enumerate().filter(|(_, frame)| kept.contains(frame)) {
             let shown = runs.iter().map(|run| to_srgb8(&run.outputs[place], &converter));
             flips.push(FlipFrame::new(frame, truths[place].picture(), shown));
@@ -192,8 +203,10 @@ struct MethodRun {
     engine: Engine,
     newest: Option<u64>,
     outputs: Vec<ColorPlane>,
-    /// The picture of the key itself, where pictures are finished.
+    /// The picture of the key itself, where pictures are finished or looked at.
     key_shown: Option<ColorPlane>,
+    /// The last frames before the newest key, for the eye.
+    before: Vec<Srgb8>,
     tally: MethodTally,
 }
 
@@ -209,7 +222,9 @@ impl MethodRun {
             engine: engine_of(method, gpu, format, options),
             newest: None,
             outputs: Vec::new(),
-            key_shown: (options.finish.mode != FinishMode::Off).then(ColorPlane::default),
+            key_shown: (options.retina || options.finish.mode != FinishMode::Off)
+                .then(ColorPlane::default),
+            before: Vec::new(),
             tally: MethodTally::new(method, options.ratio.get()),
         }
     }
@@ -251,6 +266,96 @@ impl MethodRun {
         }
         Ok(())
     }
+}
+
+/// What the eye sees, from key to key.
+struct Retina {
+    ratio: usize,
+    finish: FinishConfig,
+    pool: ThreadPool,
+    /// The last true frames before the newest key.
+    before: Vec<Srgb8>,
+}
+
+/// One key and the frames after it.
+struct Moment<'a> {
+    plan: &'a Plan,
+    index: usize,
+    key: &'a Frame,
+    truths: &'a [Truth],
+}
+
+/// Keys before the first one that is looked at: until then finishing does not know how many frames
+/// come between two.
+const UNSETTLED_KEYS: usize = 2;
+
+impl Retina {
+    fn new(options: &ScoreOptions) -> anyhow::Result<Option<Self>> {
+        if !options.retina {
+            return Ok(None);
+        }
+        let pool = ThreadPoolBuilder::new().num_threads(1).build();
+        let pool = pool.context("starting a thread to decode motion with")?;
+        let ratio = options.ratio.get();
+        Ok(Some(Self { ratio, finish: options.finish, pool, before: Vec::new() }))
+    }
+
+    /// Looks at the frames around a key, where they are all there, and keeps those before the next.
+    fn look(
+        &mut self,
+        moment: &Moment<'_>,
+        format: &StreamFormat,
+        converter: &SrgbConverter,
+        runs: &mut [MethodRun],
+    ) -> anyhow::Result<()> {
+        let Moment { plan, index, key, truths } = *moment;
+        let reach = reach(self.ratio);
+        let is_there = self.before.len() == reach && truths.len() >= reach;
+        if is_there && index >= UNSETTLED_KEYS && !key.is_cut {
+            let field = decode_field(&self.pool, format, &key.as_input())?;
+            let displacement = field.map(|field| field.displacement).unwrap_or_default();
+            let size = [format.width, format.height];
+            let gaze = gaze_of(&displacement, self.ratio as f32, size);
+            let eye = Eye::new(gaze, self.ratio, &self.finish);
+            let picture = to_srgb8(&decoded(key, format)?, converter);
+            let after: Vec<_> = truths[..reach].iter().map(Truth::picture).collect();
+            let truly = eye.sees(&around(&self.before, &picture, &after))?;
+            let keys = closeness(&eye.sees_held(&picture)?, &truly);
+            for run in &mut *runs {
+                let shown = run.key_shown.as_ref().map(|shown| to_srgb8(shown, converter));
+                let after: Vec<_> =
+                    run.outputs[..reach].iter().map(|output| to_srgb8(output, converter)).collect();
+                let after: Vec<_> = after.iter().collect();
+                let shown = shown.as_ref().unwrap_or(&picture);
+                let seen = eye.sees(&around(&run.before, shown, &after))?;
+                run.tally.retina.add(closeness(&seen, &truly), keys);
+            }
+        }
+        let is_whole = plan.left_out(index) == 0 && truths.len() >= reach;
+        let last = |count: usize| if is_whole { count - reach..count } else { 0..0 };
+        self.before =
+            truths[last(truths.len())].iter().map(|truth| truth.picture().clone()).collect();
+        for run in runs {
+            let outputs = &run.outputs[last(run.outputs.len())];
+            run.before = outputs.iter().map(|output| to_srgb8(output, converter)).collect();
+        }
+        Ok(())
+    }
+}
+
+/// A key between the frames before it and those after it.
+fn around<'a>(before: &'a [Srgb8], key: &'a Srgb8, after: &[&'a Srgb8]) -> Vec<&'a Srgb8> {
+    before.iter().chain([key]).chain(after.iter().copied()).collect()
+}
+
+/// The picture of a key, through the engine's own decoder.
+fn decoded(key: &Frame, format: &StreamFormat) -> anyhow::Result<ColorPlane> {
+    let config = EngineConfig::new(Method::Hold, NonZeroUsize::MIN);
+    let mut engine = Engine::new(*format, config);
+    engine.push_key(&key.as_input())?;
+    let mut picture = ColorPlane::default();
+    engine.synthesise(key.content_time, &mut picture).context("the engine has no key")?;
+    Ok(picture)
 }
 
 /// Reads ground truths through the engine's own decoder.

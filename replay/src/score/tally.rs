@@ -6,6 +6,7 @@ use super::metrics::flip::FlipTruth;
 use super::metrics::{ErrorPicture, TileTally, error_flicker, psnr_rgb_db, psnr_y_db, ssim};
 use super::picture::Srgb8;
 use super::report::{FramePoint, MethodScore};
+use super::retina::RetinaTally;
 
 /// A mean that grows.
 #[derive(Clone, Copy, Default, Debug)]
@@ -92,6 +93,8 @@ pub struct MethodTally {
     flicker: Mean,
     frame_ms: Mean,
     key_ms: Mean,
+    /// What the eye sees of it.
+    pub retina: RetinaTally,
     frames: Vec<FramePoint>,
 }
 
@@ -111,6 +114,7 @@ impl MethodTally {
             flicker: Mean::default(),
             frame_ms: Mean::default(),
             key_ms: Mean::default(),
+            retina: RetinaTally::default(),
             frames: Vec::new(),
         }
     }
@@ -180,6 +184,7 @@ impl MethodTally {
             error_flicker: self.flicker.value(),
             ms_per_frame: self.frame_ms.value(),
             ms_per_key: self.key_ms.value(),
+            retina: self.retina.finish(),
             by_frame: self.frames.clone(),
         }
     }

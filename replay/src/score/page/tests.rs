@@ -15,6 +15,7 @@ fn report() -> Report {
         backends: vec![None],
         threads: NonZeroUsize::MIN,
         timer: || MonoTime::ZERO,
+        retina: false,
         finish: foreframe_engine::FinishConfig::default(),
         kept_frames: 3,
         late_camera: false,

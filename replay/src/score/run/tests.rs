@@ -15,6 +15,7 @@ fn options(methods: &[Method]) -> ScoreOptions {
         backends: vec![None],
         threads: count(1),
         timer: || MonoTime::ZERO,
+        retina: false,
         finish: FinishConfig::default(),
         kept_frames: 0,
         late_camera: false,
