@@ -14,6 +14,10 @@ struct FrameParams {
     one_cell: i32,
     has_depth: u32,
     mesh_cells: vec2<u32>,
+    frames: u32,
+    is_key: u32,
+    levels: u32,
+    most_step: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: FrameParams;

@@ -142,7 +142,8 @@ impl Engine {
     /// Makes pictures on `gpu` instead of the CPU, as long as it works. To be called before the
     /// first key. [`Engine::backend`] says how it went.
     pub fn use_gpu(&mut self, gpu: &Arc<Gpu>) {
-        self.backend.use_gpu(gpu, self.format.color, self.config.method.warp());
+        let finishes = self.finish.is_some();
+        self.backend.use_gpu(gpu, self.format.color, self.config.method.warp(), finishes);
     }
 
     /// What makes the pictures, and why it is not what was asked for.
@@ -290,16 +291,18 @@ impl Engine {
             _ if phase == Phase::ZERO => Some(key),
             _ => None,
         };
-        if let Some(shown) = shown {
+        let part = self.finish.as_mut().map(|finish| finish.ledger.next_part());
+        let is_finished = if let Some(shown) = shown {
             out.copy_from(&shown.color);
+            false
         } else {
             let method = self.config.method.warp();
             let map = &self.scratch.map;
-            let frame = FrameInput { method, phase, newest: key, previous, map };
-            self.backend.make(&self.pool, &frame, out);
-        }
-        if let Some(finish) = &mut self.finish {
-            let part = finish.ledger.next_part();
+            let finish = self.finish.as_mut().zip(part).and_then(|(it, part)| it.split(part));
+            let frame = FrameInput { method, phase, newest: key, previous, map, finish };
+            self.backend.make(&self.pool, &frame, out)
+        };
+        if let Some((finish, part)) = self.finish.as_mut().zip(part).filter(|_| !is_finished) {
             finish.apply(&self.pool, part, key.valid, out);
         }
         // What lies before the newest key has no position after it.

@@ -6,6 +6,8 @@
 
 use crate::backend::shader::Shader;
 use crate::fill::far_side::FAR_SIDE;
+use crate::finish::compensate::COMPENSATE;
+use crate::finish::pyramid::PYRAMID;
 use crate::trajectory::effective::EFFECTIVE;
 use crate::warp::blend::BLEND;
 use crate::warp::gather::GATHER;
@@ -52,8 +54,8 @@ pub const KERNELS: &[Kernel] = &[
     exact("warp/linear", "warp_linear", Some(&LINEAR)),
     exact("warp/grid", "warp_grid", Some(&GRID)),
     exact("warp/voxel", "warp_voxel", None),
-    exact("finish/pyramid", "pyramid", None),
-    exact("finish/compensate", "compensate", None),
+    exact("finish/pyramid", "pyramid", Some(&PYRAMID)),
+    exact("finish/compensate", "compensate", Some(&COMPENSATE)),
 ];
 
 #[cfg(test)]

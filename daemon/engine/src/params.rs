@@ -7,6 +7,7 @@ use zerocopy::{Immutable, IntoBytes};
 
 use crate::color::ColorFormat;
 use crate::field::{FieldAxis, FieldMap};
+use crate::finish::shares::Split;
 use crate::key::KeyFrame;
 use crate::phase::Phase;
 use crate::warp::linear::one_cell;
@@ -37,6 +38,14 @@ pub struct FrameParams {
     pub has_depth: u32,
     /// Columns and rows of the mesh's cells; 0 without one.
     pub mesh_cells: [u32; 2],
+    /// Frames that share the light of a key; 0 where nothing is finished.
+    pub frames: u32,
+    /// 1 where the picture is the key of those frames, 0 where it is one of the others.
+    pub is_key: u32,
+    /// Levels of a colour channel.
+    pub levels: u32,
+    /// How far the light of an in-between frame may lie from the original's.
+    pub most_step: u32,
 }
 
 impl FrameParams {
@@ -60,6 +69,29 @@ impl FrameParams {
         }
         params
     }
+
+    /// The same with what finishing makes of the picture.
+    #[must_use]
+    pub fn finished(self, split: &Split<'_>) -> Self {
+        let [table, ..] = &split.tables.channels;
+        Self {
+            frames: table.frames(),
+            is_key: u32::from(split.is_key),
+            levels: u32::from(table.table().last_level()) + 1,
+            most_step: table.most_step(),
+            ..self
+        }
+    }
+}
+
+/// The words of `compensate.wgsl`'s lights: by channel and level the light, then by channel and
+/// level the light from which on the next level is nearer, `u32::MAX` where there is no next one.
+#[must_use]
+pub fn light_words(split: &Split<'_>) -> Vec<u32> {
+    let tables = split.tables.channels.each_ref().map(|channel| channel.table().words());
+    let lights = tables.iter().flat_map(|[lights, _]| lights.iter().copied());
+    let borders = tables.iter().flat_map(|[_, borders]| borders.iter().copied().chain([u32::MAX]));
+    lights.chain(borders).collect()
 }
 
 /// What shaders call a colour format: the constants of `color.wgsl`.

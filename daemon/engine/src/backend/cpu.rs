@@ -37,7 +37,7 @@ impl CpuBackend {
 
     /// Makes a picture after the key that was taken last into `out`, which has the size and format of the keys.
     pub fn make(&mut self, pool: &ThreadPool, frame: &FrameInput<'_>, out: &mut ColorPlane) {
-        let FrameInput { method, phase, newest: key, previous, map } = *frame;
+        let FrameInput { method, phase, newest: key, previous, map, .. } = *frame;
         match (method, previous) {
             (Method::Blend, Some(older)) => blend(pool, &older.color, &key.color, out),
             (Method::Voxel, Some(older)) => {

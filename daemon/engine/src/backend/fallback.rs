@@ -46,11 +46,18 @@ impl Backend {
     }
 
     /// Runs on `gpu` from the next key on, in a stream that has had none.
-    pub(crate) fn use_gpu(&mut self, gpu: &Arc<Gpu>, format: ColorFormat, method: Method) {
+    /// It finishes pictures too where `finishes`.
+    pub(crate) fn use_gpu(
+        &mut self,
+        gpu: &Arc<Gpu>,
+        format: ColorFormat,
+        method: Method,
+        finishes: bool,
+    ) {
         if !method.runs_on_gpus() {
             return;
         }
-        match GpuBackend::new(gpu, format, method) {
+        match GpuBackend::new(gpu, format, method, finishes) {
             Ok(backend) => {
                 self.gpu = Some(backend);
                 self.status.name = format!("gpu:{}", gpu.name());
@@ -98,11 +105,16 @@ impl Backend {
     }
 
     /// Makes a picture after the key that was taken last into `out`, which has the size and format
-    /// of the keys.
-    pub(crate) fn make(&mut self, pool: &ThreadPool, frame: &FrameInput<'_>, out: &mut ColorPlane) {
+    /// of the keys. Whether it is finished already.
+    pub(crate) fn make(
+        &mut self,
+        pool: &ThreadPool,
+        frame: &FrameInput<'_>,
+        out: &mut ColorPlane,
+    ) -> bool {
         if let Some(gpu) = &mut self.gpu {
             match gpu.make(frame, out) {
-                Ok(()) => return,
+                Ok(()) => return true,
                 Err(error) => {
                     self.fall(&error);
                     self.cpu.take_key(pool, frame.method, frame.newest);
@@ -110,6 +122,7 @@ impl Backend {
             }
         }
         self.cpu.make(pool, frame, out);
+        false
     }
 
     fn fall(&mut self, error: &GpuError) {

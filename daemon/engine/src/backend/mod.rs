@@ -16,6 +16,7 @@ pub mod shader;
 pub use fallback::BackendStatus;
 
 use crate::field::FieldMap;
+use crate::finish::shares::Split;
 use crate::key::KeyFrame;
 use crate::method::Method;
 use crate::phase::Phase;
@@ -34,4 +35,6 @@ pub struct FrameInput<'a> {
     pub previous: Option<&'a KeyFrame>,
     /// Where the cells of `newest`'s field lie.
     pub map: &'a FieldMap,
+    /// What the picture is finished with, on a backend that can.
+    pub finish: Option<Split<'a>>,
 }

@@ -64,7 +64,12 @@ impl Gpu {
 pub(crate) struct GpuBackend(Never);
 
 impl GpuBackend {
-    pub(crate) fn new(gpu: &Arc<Gpu>, _: ColorFormat, _: Method) -> Result<Self, GpuError> {
+    pub(crate) fn new(
+        gpu: &Arc<Gpu>,
+        _: ColorFormat,
+        _: Method,
+        _: bool,
+    ) -> Result<Self, GpuError> {
         match gpu.0 {}
     }
 

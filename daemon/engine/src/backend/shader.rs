@@ -45,6 +45,10 @@ pub enum Extent {
     CellStrips,
     /// Each cell that the list in a buffer has; it begins with the groups of the dispatch.
     Listed(Slot),
+    /// Each pixel of half of the valid rectangle, rounded up.
+    HalfPixels,
+    /// Each pixel of half of that.
+    QuarterPixels,
     /// Nothing: there is one alone.
     One,
     /// Each triangle of the mesh.
@@ -117,6 +121,14 @@ pub enum Slot {
     Nearest,
     /// The triangle that a pixel shows.
     Shown,
+    /// The picture at half its size.
+    HalfLevel,
+    /// At a quarter.
+    QuarterLevel,
+    /// The blur at half its size.
+    SmoothLevel,
+    /// Light of levels: [`crate::params::light_words`].
+    Lights,
     /// The picture.
     Out,
 }

@@ -18,8 +18,9 @@
 //! come between two keys is not known before; [`ledger`] keeps account.
 //!
 //! Departures from the paper: (1) gives in-between frames exactly what the key cannot take; the
-//! paper keeps the original where it is darker. Instead of grid distortion the classes of
-//! [`crate::warp::resolve`] say where a picture is not reliable: there it stays blurred.
+//! paper keeps the original where it is darker. All of a picture is blurred, reliable or not: what
+//! the paper adds where its grid is not distorted is what the key cannot take, and that is added
+//! everywhere.
 //!
 //! Finishing comes last, over the valid rectangle, and off by default.
 
@@ -35,7 +36,7 @@ use rayon::ThreadPool;
 pub use config::{FinishConfig, FinishMode, UnknownFinish};
 pub use ledger::{Ledger, Part};
 use pyramid::Pyramid;
-use shares::Shares;
+use shares::{Shares, Split};
 
 use crate::color::ColorPlane;
 use crate::format::StreamFormat;
@@ -56,6 +57,11 @@ impl Finish {
     pub fn new(format: &StreamFormat, config: &FinishConfig, ppd: Option<f32>) -> Option<Self> {
         let shares = Shares::new(format, config, ppd)?;
         Some(Self { ledger: Ledger::default(), shares, pyramid: Pyramid::default() })
+    }
+
+    /// What a backend makes `part` with; None where it stays as it is.
+    pub(crate) fn split(&mut self, part: Part) -> Option<Split<'_>> {
+        self.shares.of(part)
     }
 
     /// Finishes `picture`, of which `valid` is the part that holds the image.

@@ -178,7 +178,11 @@ fn the_parameters_lie_where_the_shaders_read_them() {
         smooth_limit,
         one_cell,
         has_depth,
-        mesh_cells
+        mesh_cells,
+        frames,
+        is_key,
+        levels,
+        most_step
     );
     let found: Vec<_> =
         members.iter().map(|member| (member.name.as_deref().unwrap(), member.offset)).collect();
@@ -222,6 +226,7 @@ fn constants_of_the_shaders_are_those_of_the_cpu() {
         ("SOURCE_BITS", i64::from(SOURCE_BITS)),
         ("MAX_CELLS", i64::from(MAX_CELLS)),
         ("LARGEST", i64::from(crate::trajectory::effective::LARGEST)),
+        ("FULL_LIGHT", i64::from(foreframe_perception::compensation::FULL_LIGHT)),
         ("RGBA8", i64::from(format_code(Rgba8))),
         ("RGB10A2", i64::from(format_code(Rgb10a2))),
         ("RGBA16F", i64::from(format_code(Rgba16f))),

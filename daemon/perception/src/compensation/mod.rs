@@ -68,6 +68,12 @@ impl Compensation {
         self.frames
     }
 
+    /// How far the light of an in-between frame may lie from the original's, of [`FULL_LIGHT`].
+    #[must_use]
+    pub fn most_step(&self) -> u32 {
+        self.most_step
+    }
+
     /// The levels that stand for `original` where the in-between frames show `blurred` if they can.
     /// Levels beyond the last count as the last.
     ///
@@ -104,20 +110,6 @@ impl Compensation {
             self.table.level(least.into())
         } else {
             blurred
-        }
-    }
-
-    /// The level of in-between frames where no key has to make up for them: they differ from a key
-    /// no more than they may, and are else as blurred as is wanted.
-    #[must_use]
-    pub fn uncompensated(&self, original: u16, blurred: u16) -> u16 {
-        let light = self.table.light(original);
-        let wanted = self.table.light(blurred);
-        let [least, most] = [light.saturating_sub(self.most_step), light + self.most_step];
-        if (least..=most).contains(&wanted) {
-            blurred
-        } else {
-            self.table.level(wanted.clamp(least, most).into())
         }
     }
 

@@ -137,15 +137,6 @@ fn frames_that_may_not_differ_by_more_keep_to_it_and_to_their_light() {
 }
 
 #[test]
-fn what_no_key_makes_up_for_is_as_blurred_as_is_wanted_within_the_limit() {
-    let table = LightTable::new(256, |code| libm::pow(code, 2.2)).unwrap();
-    let free = Compensation::new(table, 3).unwrap();
-    assert_eq!((free.uncompensated(0, 200), free.in_between(0, 200)), (200, 0));
-    let kept = free.within(FULL_LIGHT / 10);
-    assert!((1..200).contains(&kept.uncompensated(0, 200)));
-}
-
-#[test]
 fn other_numbers_of_frames_are_refused() {
     let table = LightTable::new(256, |code| code).unwrap();
     assert!(Compensation::new(table.clone(), 1).is_err());

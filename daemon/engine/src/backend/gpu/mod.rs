@@ -28,9 +28,12 @@ use super::shader::{Extent, STRIP, Shader, Slot};
 use crate::color::{ColorFormat, ColorPlane};
 use crate::field::FieldMap;
 use crate::fill::far_side::FAR_SIDE;
+use crate::finish::compensate::COMPENSATE;
+use crate::finish::pyramid::PYRAMID;
+use crate::finish::shares::Split;
 use crate::key::KeyFrame;
 use crate::method::Method;
-use crate::params::{FrameParams, map_words};
+use crate::params::{FrameParams, light_words, map_words};
 use crate::phase::Phase;
 use crate::trajectory::effective::EFFECTIVE;
 use crate::warp::blend::BLEND;
@@ -70,6 +73,9 @@ fn frame_shaders(method: Method) -> &'static [&'static Shader] {
     }
 }
 
+/// The shaders that finish a frame, in order.
+const FINISH_SHADERS: [&Shader; 2] = [&PYRAMID, &COMPENSATE];
+
 /// Words of a list of cells before the cells.
 const LIST_HEADER: u64 = 4;
 
@@ -84,6 +90,10 @@ pub(crate) struct GpuBackend {
     key_steps: Vec<Step>,
     accelerating_steps: Vec<Step>,
     frame_steps: Vec<Step>,
+    /// Empty in a stream that is not finished.
+    finish_steps: Vec<Step>,
+    /// Whether the light of levels is on the device.
+    has_lights: bool,
     planes: Planes,
     field_upload: [Upload; 4],
     color_upload: Upload,
@@ -94,7 +104,7 @@ pub(crate) struct GpuBackend {
 }
 
 impl GpuBackend {
-    /// For a stream of `format` and `method`. Compiles what it needs.
+    /// For a stream of `format` and `method`, which is finished or not. Compiles what it needs.
     ///
     /// # Errors
     /// If the device is gone or takes a shader not.
@@ -102,6 +112,7 @@ impl GpuBackend {
         gpu: &Arc<Gpu>,
         format: ColorFormat,
         method: Method,
+        finishes: bool,
     ) -> Result<Self, GpuError> {
         let steps = |shaders: &[&'static Shader]| -> Result<Vec<Step>, GpuError> {
             shaders.iter().map(|shader| Ok((*shader, gpu.shader(shader, format)?))).collect()
@@ -112,6 +123,8 @@ impl GpuBackend {
             key_steps: steps(key_shaders(method))?,
             accelerating_steps: steps(accelerating_shaders(method))?,
             frame_steps: steps(frame_shaders(method))?,
+            finish_steps: if finishes { steps(&FINISH_SHADERS)? } else { Vec::new() },
+            has_lights: false,
             planes: Planes::default(),
             field_upload: Default::default(),
             color_upload: Upload::default(),
@@ -228,10 +241,40 @@ impl GpuBackend {
                     | Slot::Tables
                     | Slot::Vertices
                     | Slot::Cuts
+                    | Slot::HalfLevel
+                    | Slot::QuarterLevel
+                    | Slot::SmoothLevel
+                    | Slot::Lights
                     | Slot::Out => continue,
                 };
                 self.planes.sized(&self.gpu, slot, size)?;
             }
+        }
+        Ok(())
+    }
+
+    /// Gives the levels their sizes, and sends the light of levels up once.
+    fn prepare_finish(
+        &mut self,
+        split: &Split<'_>,
+        params: &FrameParams,
+        bytes_per_pixel: u64,
+    ) -> Result<(), GpuError> {
+        let gpu = Arc::clone(&self.gpu);
+        let half = params.valid_size.map(|side| side.div_ceil(2));
+        let quarter = half.map(|side| side.div_ceil(2));
+        let sizes =
+            [(Slot::HalfLevel, half), (Slot::QuarterLevel, quarter), (Slot::SmoothLevel, half)];
+        for (slot, [width, height]) in sizes {
+            let size = u64::from(width) * u64::from(height) * bytes_per_pixel;
+            self.planes.sized(&gpu, slot, size)?;
+        }
+        if !self.has_lights {
+            let words = light_words(split);
+            let bytes = words.as_bytes();
+            let lights = self.planes.sized(&gpu, Slot::Lights, bytes.len() as u64)?;
+            gpu.queue.write_buffer(lights, 0, bytes);
+            self.has_lights = true;
         }
         Ok(())
     }
@@ -247,16 +290,24 @@ impl GpuBackend {
     ) -> Result<(), GpuError> {
         let gpu = Arc::clone(&self.gpu);
         gpu.guard(|| {
-            let params = self.params(frame.newest, frame.map, frame.phase);
+            let mut params = self.params(frame.newest, frame.map, frame.phase);
+            let bytes_per_pixel = u64::from(out.format().bytes_per_pixel());
             let bytes = out.as_mut_bytes();
             let size = bytes.len() as u64;
             self.planes.sized(&gpu, Slot::Out, size)?;
+            if let Some(split) = &frame.finish {
+                params = params.finished(split);
+                self.prepare_finish(split, &params, bytes_per_pixel)?;
+            }
             self.planes.write_params(&gpu, &params)?;
             let mut commands = gpu.device.create_command_encoder(&Default::default());
             if !frame.newest.acceleration.data().is_empty() {
                 dispatch(&gpu, &mut commands, &self.accelerating_steps, &self.planes, &params)?;
             }
             dispatch(&gpu, &mut commands, &self.frame_steps, &self.planes, &params)?;
+            if frame.finish.is_some() {
+                dispatch(&gpu, &mut commands, &self.finish_steps, &self.planes, &params)?;
+            }
             let made = self.planes.sized(&gpu, Slot::Out, size)?;
             self.download.copy(&gpu, &mut commands, made, size);
             let submission = gpu.queue.submit([commands.finish()]);
@@ -287,6 +338,8 @@ fn dispatch(
                 Extent::CellColumns => [params.cells[0], 1],
                 Extent::CellRows => [params.cells[1], 1],
                 Extent::One => [1, 1],
+                Extent::HalfPixels => params.valid_size.map(|side| side.div_ceil(2)),
+                Extent::QuarterPixels => params.valid_size.map(|side| side.div_ceil(4)),
                 Extent::CellStrips => [params.cells[0], params.cells[1].div_ceil(STRIP)],
                 Extent::Listed(slot) => {
                     pass.set_pipeline(pipeline);

@@ -67,7 +67,7 @@ fn on_gpu(
     phases: impl Iterator<Item = Phase>,
 ) -> Vec<ColorPlane> {
     let [older, newest] = [keys[0], keys[keys.len() - 1]];
-    let mut backend = GpuBackend::new(gpu, newest.color.format(), method).unwrap();
+    let mut backend = GpuBackend::new(gpu, newest.color.format(), method, false).unwrap();
     for key in keys {
         backend.take_key(key, &map_of_moving(key)).unwrap();
     }
@@ -91,7 +91,7 @@ fn input<'a>(
     newest: &'a KeyFrame,
     map: &'a FieldMap,
 ) -> FrameInput<'a> {
-    FrameInput { method, phase, newest, previous: Some(older), map }
+    FrameInput { method, phase, newest, previous: Some(older), map, finish: None }
 }
 
 /// The first byte in which two pictures differ.
@@ -301,7 +301,7 @@ fn a_shader_that_does_not_compile_is_an_error_and_the_device_goes_on() {
             assert!(matches!(error, GpuError::Refused { .. }), "{text}: {error}");
         }
         assert!(!gpu.is_lost());
-        GpuBackend::new(&gpu, ColorFormat::Rgba8, Method::Blend).unwrap();
+        GpuBackend::new(&gpu, ColorFormat::Rgba8, Method::Blend, false).unwrap();
     }
 }
 
@@ -309,10 +309,76 @@ fn a_shader_that_does_not_compile_is_an_error_and_the_device_goes_on() {
 fn a_step_before_its_key_is_an_error() {
     for gpu in test_gpus("a_step_before_its_key_is_an_error") {
         let key = key(noise(ColorFormat::Rgba8, 4, 4, 1), Plane::default(), Plane::default());
-        let mut backend = GpuBackend::new(&gpu, ColorFormat::Rgba8, Method::Blend).unwrap();
+        let mut backend = GpuBackend::new(&gpu, ColorFormat::Rgba8, Method::Blend, false).unwrap();
         let mut out = key.color.clone();
         let map = FieldMap::default();
         let made = backend.make(&input(Method::Blend, Phase::ZERO, &key, &key, &map), &mut out);
         assert!(matches!(made, Err(GpuError::Refused { .. })), "{made:?}");
+    }
+}
+
+#[test]
+fn every_adapter_finishes_as_the_cpu_does() {
+    use crate::finish::{Finish, FinishConfig, FinishMode, Part};
+    use crate::format::StreamFormat;
+    use crate::time::MonoSpan;
+    let parts = [
+        Part::Key { frames: 3 },
+        Part::InBetween { frames: 3 },
+        Part::InBetween { frames: 2 },
+        Part::Key { frames: 7 },
+    ];
+    let cases = [([1, 1], None), ([17, 9], None), ([203, 77], Some([3, 5, 190, 66]))];
+    for gpu in test_gpus("every_adapter_finishes_as_the_cpu_does") {
+        for (seed, (size, valid)) in (0..).zip(cases) {
+            for (format, mode) in FORMATS
+                .into_iter()
+                .flat_map(|format| [(format, FinishMode::On), (format, FinishMode::Auto)])
+            {
+                let stream =
+                    StreamFormat { color: format, ..StreamFormat::rgba8(size[0], size[1]) };
+                let config = FinishConfig {
+                    mode,
+                    gamma: Some([2.2, 2.0, 1.8]),
+                    refresh_interval: MonoSpan::from_hz(120.0),
+                    ..FinishConfig::default()
+                };
+                let mut finish = Finish::new(&stream, &config, Some(56.0)).unwrap();
+                let mut key = key(
+                    noise(format, size[0], size[1], seed),
+                    Plane::default(),
+                    velocity_noise(size[0], size[1], 3, seed),
+                );
+                if let Some([x, y, width, height]) = valid {
+                    key.valid = Rect { x, y, width, height };
+                }
+                let map = map_of(&key);
+                let mut backend = GpuBackend::new(&gpu, format, Method::Gather, true).unwrap();
+                backend.take_key(&key, &map).unwrap();
+                let phase = Phase::from_f64(0.37);
+                for part in parts {
+                    let mut expected = on_cpu(Method::Gather, &[&key], phase);
+                    finish.apply(&pool(1), part, key.valid, &mut expected);
+                    let split = finish.split(part);
+                    let frame = FrameInput {
+                        finish: split,
+                        ..input(Method::Gather, phase, &key, &key, &map)
+                    };
+                    let mut made = key.color.clone();
+                    backend.make(&frame, &mut made).unwrap();
+                    assert_eq!(
+                        difference(&made, &expected),
+                        None,
+                        "{part:?} of {format:?} {size:?} {mode} on {}",
+                        gpu.name()
+                    );
+                }
+                let plain = on_cpu(Method::Gather, &[&key], phase);
+                let mut finished = plain.clone();
+                finish.apply(&pool(1), parts[0], key.valid, &mut finished);
+                let is_changed = difference(&plain, &finished).is_some();
+                assert!(is_changed || size == [1, 1] || mode == FinishMode::Auto);
+            }
+        }
     }
 }

@@ -17,5 +17,7 @@
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 mod cpu;
+mod gpu;
 
 pub use cpu::compensate;
+pub use gpu::COMPENSATE;

@@ -18,9 +18,11 @@
 //! two, so that a flat picture comes back. Exactness: `Exact`.
 
 mod cpu;
+mod gpu;
 
 pub use cpu::pyramid;
 pub(super) use cpu::{Expanded, up_rows};
+pub use gpu::PYRAMID;
 
 use crate::color::ColorPlane;
 
