@@ -213,3 +213,53 @@ fn finishing_is_off_by_default_and_on_it_shares_the_light_of_a_key_among_its_fra
         assert!((ends[0]..=ends[1]).contains(&original), "{original} of {key} and {between}");
     }
 }
+
+/// Pushes a key of noise by `seed`, whose vectors claim 3 pixels right.
+fn push_place(engine: &mut Engine, at_ms: i64, seed: u32, moved: u32) {
+    let (width, height) = (128, 64);
+    let shown = |x: u32, y: u32| {
+        let (x, y) = (x.wrapping_sub(moved), y);
+        let fine = crate::testing::hash(x / 3, y / 3, seed) % 60;
+        (fine + crate::testing::hash(x / 32, y / 32, seed) % 90) as u8
+    };
+    let color: Vec<u8> =
+        (0..height).flat_map(|y| (0..width).flat_map(move |x| [shown(x, y); 4])).collect();
+    let motion: Vec<u8> =
+        (0..width * height).flat_map(|_| [3.0_f32, 0.0]).flat_map(f32::to_le_bytes).collect();
+    let plane = |bytes, bytes_per_pixel: u32| PlaneInput {
+        pixels: Pixels::Bytes(bytes),
+        width,
+        height,
+        stride: width * bytes_per_pixel,
+        valid: Rect::full(width, height),
+        jitter: [0.0; 2],
+    };
+    let content_time = MonoTime::ZERO + MonoSpan::from_ms(at_ms);
+    let pushed = engine.push_key(&KeyInput {
+        index: 0,
+        content_time,
+        motion_from: Some(content_time - MonoSpan::from_ms(25)),
+        is_cut: false,
+        color: plane(&color, 4),
+        depth: None,
+        motion: Some(plane(&motion, 8)),
+        camera: None,
+        motion_from_camera: None,
+    });
+    pushed.unwrap();
+}
+
+#[test]
+fn no_frame_moves_after_a_cut_that_nobody_declared_and_a_skipped_key_is_no_cut() {
+    let format = StreamFormat { width: 128, height: 64, ..format() };
+    let mut engine = Engine::new(format, EngineConfig::new(Method::Auto, NonZeroUsize::MIN));
+    let mut moving = Vec::new();
+    // Three keys of a place, one of them skipped, then another place.
+    for (at_ms, seed, moved) in [(25, 1, 3), (50, 1, 6), (100, 1, 12), (125, 2, 15), (150, 2, 18)] {
+        push_place(&mut engine, at_ms, seed, moved);
+        let key = frame(&mut engine, at_ms);
+        let after: Vec<_> = [6, 12, 18].map(|ms| frame(&mut engine, at_ms + ms)).into();
+        moving.push(after.iter().filter(|frame| **frame != key).count());
+    }
+    assert_eq!(moving[1..], [3, 3, 0, 3], "frames that move, by key");
+}

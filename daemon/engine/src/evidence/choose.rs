@@ -45,7 +45,7 @@ pub(super) fn choose(
         count += 1.0;
     }
     if count == 0.0 {
-        leads.data_mut().fill(Lead { rung: image });
+        leads.data_mut().fill(Lead::by(image));
         return image;
     }
     let mean = sum.map(|sum| sum / count);
@@ -59,16 +59,19 @@ pub(super) fn choose(
             let own = samples.row(row);
             for (column, (lead, sample)) in (0..).zip(leads.iter_mut().zip(own)) {
                 if is_settled(sample) {
-                    *lead = sample.lead;
+                    *lead = Lead::by(sample.lead.rung);
                     continue;
                 }
                 let whole = |count: f32| Preferred { rung: image, slack: Some(DOUBT / count) };
-                lead.rung = match score(samples, column, row) {
-                    Some((score, count)) if sample.keys > 1 => {
-                        cheapest(&score, order, &[tolerated(sample.lead.rung), whole(count)])
-                    }
-                    Some((score, count)) => cheapest(&score, order, &[whole(count)]),
-                    None => image,
+                let Some(Score { score, count, share }) = score(samples, column, row) else {
+                    *lead = Lead::by(image);
+                    continue;
+                };
+                lead.share = share;
+                lead.rung = if sample.keys > 1 {
+                    cheapest(&score, order, &[tolerated(sample.lead.rung), whole(count)])
+                } else {
+                    cheapest(&score, order, &[whole(count)])
                 };
             }
         },
@@ -104,15 +107,34 @@ pub(super) fn share(pool: &ThreadPool, leads: &Plane<Lead>, shared: &mut Plane<u
                 let columns = column.saturating_sub(1)..(column + 2).min(width as usize);
                 let is_shared =
                     rows.iter().all(|row| row[columns.clone()].iter().all(|lead| *lead == own));
-                *shared = if is_shared { index_of(own.rung) as u8 } else { MIXED };
+                *shared = if is_shared && own.share == Lead::WHOLE {
+                    index_of(own.rung) as u8
+                } else {
+                    MIXED
+                };
             }
         },
     );
 }
 
-/// (4) at one sample, and of how many; None where nothing is known of the surface.
+/// What the samples of a surface around one say.
+struct Score {
+    /// (4).
+    score: PerRung,
+    /// Of how many samples.
+    count: f32,
+    /// The share of its motion that goes on.
+    share: u8,
+}
+
+/// One of so many samples of a surface has at least to have motion that is news: a surface jumps as a
+/// whole, and a vector that is wrong alone is none of its neighbours' business.
+const NEWS_OF: u32 = 2;
+
+/// [`Score`] at one sample; None where nothing is known of the surface.
 #[inline(always)]
-fn score(samples: &Plane<Sample>, column: u32, row: u32) -> Option<(PerRung, f32)> {
+fn score(samples: &Plane<Sample>, column: u32, row: u32) -> Option<Score> {
+    let (mut news, mut shares) = (0, 0);
     let depth = samples.row(row)[column as usize].depth;
     let (mut sum, mut count) = (PerRung::default(), 0.0);
     let last = [samples.width() - 1, samples.height() - 1];
@@ -124,10 +146,20 @@ fn score(samples: &Plane<Sample>, column: u32, row: u32) -> Option<(PerRung, f32
                     *sum += mean;
                 }
                 count += 1.0;
+                news += u32::from(sample.share < Lead::WHOLE);
+                shares += if sample.share < Lead::WHOLE { u32::from(sample.share) } else { 0 };
             }
         }
     }
-    (count > 0.0).then(|| (sum.map(|sum| sum / count), count))
+    let is_news = news > 0 && (NEWS_OF * news) as f32 >= count;
+    #[expect(clippy::cast_possible_truncation, reason = "the mean of sixteenths")]
+    let share = if is_news { (shares / news) as u8 } else { Lead::WHOLE };
+    (count > 0.0).then(|| {
+        for sum in &mut sum {
+            *sum /= count;
+        }
+        Score { score: sum, count, share }
+    })
 }
 
 /// A rung that is taken before others although they are better.

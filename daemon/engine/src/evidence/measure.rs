@@ -53,6 +53,8 @@ pub(super) struct Trace {
     is_known: bool,
     /// Whether the whole ladder is to be measured.
     needs_all: bool,
+    /// Where the rung in use had said that it would be by now.
+    foreseen: [f32; 2],
 }
 
 /// Errors of the camera's orders over samples that move with the world, and their number.
@@ -120,8 +122,13 @@ impl Measuring<'_> {
                 }
                 let (d, _) = self.lattice.at(column, row);
                 let now = all_errors(known, trace.cell, d);
+                let moves_with_world = is_still(column, row);
+                // What the camera's poses explain is no jump of a surface, and no wrong vector.
+                if !moves_with_world {
+                    sample.share = share(d, trace.foreseen, &now);
+                }
                 self.take_in(sample, trace.cell, &now, |_| true);
-                if is_still(column, row) {
+                if moves_with_world {
                     for (sum, error) in sums[0].iter_mut().zip(&now[WORLD..]) {
                         *sum += error;
                     }
@@ -174,6 +181,7 @@ impl Measuring<'_> {
             _ => predicted(predictions, used, cell),
         };
         now[used_index] = foreseen.map_or(now[LINEAR], |foreseen| error(foreseen, d));
+        trace.foreseen = foreseen.unwrap_or(straight);
         trace.needs_all = is_its_turn || foreseen.is_none() || now[used_index] > FAILED;
         if trace.needs_all {
             return (sample, trace);
@@ -212,7 +220,7 @@ impl Measuring<'_> {
             for (index, (mean, now)) in sample.mean.iter_mut().zip(now).enumerate() {
                 *mean = if is_measured(index) { *now } else { 1.0 };
             }
-            (sample.keys, sample.lead) = (1, Lead { rung: self.image_rung });
+            (sample.keys, sample.lead) = (1, Lead::by(self.image_rung));
             return;
         };
         sample.lead = history.lead;
@@ -225,6 +233,31 @@ impl Measuring<'_> {
         }
     }
 }
+
+/// The part of the motion `d` that was foreseen, in sixteenths, where every rung's error is more than
+/// half of it.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "0 to 16")]
+#[expect(clippy::cast_sign_loss, reason = "0 to 16")]
+fn share(d: [f32; 2], foreseen: [f32; 2], now: &PerRung) -> u8 {
+    let square = d[0] * d[0] + d[1] * d[1];
+    let least = now.iter().fold(1.0_f32, |least, error| least.min(*error));
+    // e^2 of (2).
+    let off = least * CONTRAST_PX * CONTRAST_PX / (1.0 - least).max(f32::MIN_POSITIVE);
+    // Written so that NaN fails it.
+    let is_news = off > NEWS_PX * NEWS_PX && off > NEWS * NEWS * square;
+    if !is_news {
+        return Lead::WHOLE;
+    }
+    let part = (d[0] * foreseen[0] + d[1] * foreseen[1]) / square;
+    (part.clamp(0.0, 1.0) * f32::from(Lead::WHOLE) + 0.5) as u8
+}
+
+/// Part of a motion beyond which its error makes it news: there is more of it that nobody foresaw than
+/// somebody did.
+const NEWS: f32 = 0.5;
+/// And the least error, pixels: half of [`CONTRAST_PX`].
+const NEWS_PX: f32 = 1.0;
 
 /// Runs further on that those measured by the whole ladder lie in the next row: not below each other.
 const TURN_STEP: u32 = 5;

@@ -17,6 +17,11 @@
 //! rung that the whole image would take, by the mean of m over it, is preferred the more, the fewer
 //! samples there are to judge a surface by.
 //!
+//! Where the rungs have failed and most of a surface's motion is news, it may be a jump as well as a
+//! beginning: only that part of it goes on which was foreseen. That limits overshoot where
+//! something turns back, and a vector that is wrong for one key moves nothing. Wrong
+//! vectors that stay are found by luma ([`trust`]).
+//!
 //! What is not needed is not measured: `hold`, `linear` and the rung in use always, the others where
 //! that has failed, and in a sixteenth of the samples in turn. A richer rung that is not
 //! measured counts as good as the one in use, which has not failed; a cheaper one keeps its mean.
@@ -29,12 +34,15 @@ mod choose;
 mod measure;
 #[cfg(test)]
 mod tests;
+mod trust;
 
 use rayon::ThreadPool;
 
 pub use measure::Predictions;
 use measure::{Measuring, OrderSums, Trace, WORLD};
+use trust::Trust;
 
+use crate::key::KeyFrame;
 use crate::plane::Plane;
 use crate::trajectory::camera_path::CameraOrder;
 use crate::trajectory::lattice::Lattice;
@@ -71,14 +79,41 @@ pub const fn index_of(rung: Rung) -> usize {
 }
 
 /// What leads a surface on from the newest key.
-#[derive(Clone, Copy, PartialEq, Debug, Default)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Lead {
     /// The rung in use.
     pub rung: Rung,
+    /// Where most of its motion is news, the part of it that was foreseen, in sixteenths; else
+    /// [`Lead::WHOLE`].
+    pub share: u8,
+}
+
+impl Lead {
+    /// The share of motion that goes on as it is.
+    pub const WHOLE: u8 = 16;
+
+    /// By `rung`, whole.
+    #[must_use]
+    pub const fn by(rung: Rung) -> Self {
+        Self { rung, share: Self::WHOLE }
+    }
+
+    /// The part of its motion that a surface goes on with, where that is not all of it.
+    #[must_use]
+    #[inline(always)]
+    pub fn part(self) -> Option<f32> {
+        (self.share < Self::WHOLE).then(|| f32::from(self.share) / f32::from(Self::WHOLE))
+    }
+}
+
+impl Default for Lead {
+    fn default() -> Self {
+        Self::by(Rung::default())
+    }
 }
 
 /// What is known of the surface at one sample of the newest key.
-#[derive(Clone, Copy, PartialEq, Debug, Default)]
+#[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Sample {
     /// m of (3).
     pub mean: PerRung,
@@ -88,6 +123,16 @@ pub struct Sample {
     pub keys: u8,
     /// What led it so far.
     lead: Lead,
+    /// The share of its motion that goes on.
+    share: u8,
+}
+
+impl Default for Sample {
+    /// Of nothing that is known.
+    fn default() -> Self {
+        let lead = Lead::default();
+        Self { mean: PerRung::default(), depth: 0, keys: 0, lead, share: Lead::WHOLE }
+    }
 }
 
 /// Runs of eight samples of which one is measured by the whole ladder, key by key in turn.
@@ -109,6 +154,7 @@ pub struct Evidence {
     leads: Plane<Lead>,
     /// Per sample the index of the rung that it and all around it take, or [`MIXED`].
     shared: Plane<u8>,
+    trust: Trust,
     /// Keys taken in.
     count: u32,
     order: CameraOrder,
@@ -127,6 +173,7 @@ impl Default for Evidence {
             traces: Plane::default(),
             leads: Plane::default(),
             shared: Plane::default(),
+            trust: Trust::default(),
             count: 0,
             order: CameraOrder::default(),
             order_errors: None,
@@ -136,11 +183,12 @@ impl Default for Evidence {
 }
 
 impl Evidence {
-    /// Takes in what the new key, whose field is that of `lattice`, shows of the `predictions` of the
+    /// Takes in what `key`, whose field is that of `lattice`, shows of the `predictions` of the
     /// key before it; None where there were none. `is_still` says which samples move with the world.
     pub fn update(
         &mut self,
         pool: &ThreadPool,
+        key: &KeyFrame,
         lattice: &Lattice,
         predictions: Option<&mut Predictions<'_>>,
         is_still: impl Fn(u32, u32) -> bool + Sync,
@@ -156,8 +204,13 @@ impl Evidence {
             turn: [turns, self.count % turns],
             orders_alone,
         };
+        self.trust.clear();
         match predictions {
             Some(predictions) => {
+                if !orders_alone {
+                    let older = predictions.key;
+                    self.trust.update(pool, key, lattice, older, self.count);
+                }
                 let (traces, samples) = (&mut self.traces, &mut self.samples);
                 let sums = measuring.measure(pool, predictions, is_still, traces, samples);
                 self.choose_order(&sums);
@@ -171,13 +224,30 @@ impl Evidence {
 
     /// Gives every sample its rung.
     fn choose_rungs(&mut self, pool: &ThreadPool) {
-        let Self { samples, leads, shared, order, image_rung, .. } = self;
+        let Self { samples, leads, shared, trust, order, image_rung, .. } = self;
         *image_rung = choose::choose(pool, *order, *image_rung, samples, leads);
-        choose::share(pool, leads, shared);
         // The next key's history.
         for (sample, lead) in samples.data_mut().iter_mut().zip(leads.data()) {
             sample.lead = *lead;
         }
+        if trust.is_cut() {
+            leads.data_mut().fill(Lead::by(Rung::Hold));
+        } else if trust.doubts() {
+            for row in 0..leads.height() {
+                for (column, lead) in (0..).zip(leads.row_mut(row)) {
+                    if !trust.of(column, row) {
+                        *lead = Lead::by(Rung::Hold);
+                    }
+                }
+            }
+        }
+        choose::share(pool, leads, shared);
+    }
+
+    /// Whether luma has shown that the newest key is a cut that nobody declared.
+    #[must_use]
+    pub fn is_cut(&self) -> bool {
+        self.trust.is_cut()
     }
 
     /// Forgets everything: the scene is another.
@@ -188,7 +258,7 @@ impl Evidence {
         for plane in [&mut self.samples, &mut self.older] {
             plane.data_mut().fill(Sample::default());
         }
-        self.leads.data_mut().fill(Lead { rung: self.image_rung });
+        self.leads.data_mut().fill(Lead::by(self.image_rung));
         self.shared.data_mut().fill(index_of(self.image_rung) as u8);
     }
 
@@ -233,17 +303,17 @@ impl Evidence {
         RUNGS.get(usize::from(*first)).copied().filter(|_| is_one)
     }
 
-    /// The rung of a cell of depth key `depth` of the newest key: that of the sample of its surface
+    /// What leads a cell of depth key `depth` of the newest key on: that of the sample of its surface
     /// which is nearest to it among its own and those around, else the image's.
     #[must_use]
     #[inline(always)]
-    pub fn rung_at(&self, x: u32, y: u32, depth: u32) -> Rung {
+    pub fn lead_at(&self, x: u32, y: u32, depth: u32) -> Lead {
         let (column, row) = (x / STRIDE, y / STRIDE);
         let is_its = |column: u32, row: u32| {
             is_same_surface(self.samples.row(row)[column as usize].depth, depth)
         };
         if is_its(column, row) {
-            return self.leads.at(column, row).rung;
+            return self.leads.at(column, row);
         }
         let last = [self.samples.width() - 1, self.samples.height() - 1];
         let rows = row.saturating_sub(1)..=(row + 1).min(last[1]);
@@ -252,7 +322,7 @@ impl Evidence {
             columns.map(move |column| (column, row))
         });
         let found = around.find(|(column, row)| is_its(*column, *row));
-        found.map_or(self.image_rung, |(column, row)| self.leads.at(column, row).rung)
+        found.map_or(Lead::by(self.image_rung), |(column, row)| self.leads.at(column, row))
     }
 
     /// Chooses the camera's order from the still samples that have just been measured.

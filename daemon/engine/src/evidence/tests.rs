@@ -221,3 +221,47 @@ fn what_the_camera_chases_stays_where_it_is_in_the_picture() {
     let ground = last.velocity.at(20, 20);
     assert!(ground.x.abs() > 32, "the ground goes by: {ground:?}");
 }
+
+#[test]
+fn what_jumps_goes_on_as_it_did_before_and_what_begins_to_move_waits_for_a_key() {
+    // A board that slides by 3 pixels per key jumps 40 further once; the wall behind it is still.
+    let at = |index: i64| 20.0 + 3.0 * index as f32 + if index >= 4 { 40.0 } else { 0.0 };
+    let keys = |count: i64| {
+        (0..count).map(move |index| {
+            let (now, before) = (at(index), at(index - 1));
+            let is_board = move |x: u32| (now..now + 24.0).contains(&(x as f32));
+            let was = move |x, y| {
+                if is_board(x) {
+                    [x as f32 - (now - before), y as f32]
+                } else {
+                    [x as f32, y as f32]
+                }
+            };
+            key(index, move |x, _| if is_board(x) { NEAR } else { FAR }, was)
+        })
+    };
+    let (ladder, jumped) = climbed(Method::Auto, keys(5));
+    let x = at(4) as u32 + 12;
+    assert!(ladder.evidence().leads().at(x / STRIDE, 10).part().is_some());
+    let vx = f32::from(jumped.velocity.at(x, 44).x) / 32.0;
+    assert!((vx - 3.0).abs() <= 1.5, "it went on by {vx} px");
+    let (ladder, after) = climbed(Method::Auto, keys(6));
+    let x = at(5) as u32 + 12;
+    let vx = f32::from(after.velocity.at(x, 44).x) / 32.0;
+    assert!(vx < 3.1, "one key later the jump is no motion: {vx} px, {:?}", rung(&ladder, x, 44));
+
+    // From rest.
+    let begins = (0..4).map(|index| {
+        let d = if index == 3 { 6.0 } else { 0.0 };
+        key(index, |_, _| FAR, move |x, y| [x as f32 - d, y as f32])
+    });
+    let (_, last) = climbed(Method::Auto, begins);
+    assert_eq!(last.velocity.at(60, 44), Default::default());
+}
+
+#[test]
+fn a_camera_that_begins_to_move_is_believed_at_once() {
+    let begins = |index: i64| camera(0.0, if index == 6 { 2.0 } else { 0.0 });
+    let (_, last) = climbed(Method::Auto, seen(begins));
+    assert!(last.velocity.at(60, 44).x.abs() > 32, "{:?}", last.velocity.at(60, 44));
+}

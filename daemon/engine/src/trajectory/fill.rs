@@ -118,6 +118,13 @@ impl Filling<'_> {
         }
     }
 
+    /// Takes one cell on by a part of its motion.
+    #[inline(always)]
+    pub(super) fn part_of_motion(&self, part: f32, x: u32, y: u32) -> (Velocity, Acceleration) {
+        let [dx, dy] = self.key.displacement.at(x, y);
+        damped(Curve::straight([dx * part, dy * part]), self.px_per_span).quantise()
+    }
+
     /// Takes one cell on.
     #[inline(always)]
     pub(super) fn one(&self, rung: Rung, x: u32, y: u32) -> (Velocity, Acceleration) {

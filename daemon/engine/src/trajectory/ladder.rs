@@ -23,7 +23,7 @@ use super::quadratic::Quadratic;
 use super::rung::Rung;
 use super::world::World;
 use crate::bands::for_each_row_of_two;
-use crate::evidence::{Evidence, Predictions};
+use crate::evidence::{Evidence, Lead, Predictions};
 use crate::key::{Acceleration, Camera, KeyFrame, Velocity};
 use crate::lanes::LANES;
 use crate::method::Method;
@@ -228,6 +228,12 @@ impl Ladder {
             let followed = older.filter(|older| key.motion_from == Some(older.content_time));
             self.weigh(pool, key, &models, followed, before);
         }
+        if self.evidence.is_cut() {
+            // The next key knows two poses of this place, and no more.
+            let newest = self.path.newest().copied();
+            self.path.cut();
+            newest.into_iter().for_each(|pose| self.path.push(pose));
+        }
         self.fit_affine(pool, &mut models);
         self.spare = std::mem::replace(&mut self.models, models);
         self.models.late = self.late_world(key);
@@ -295,7 +301,7 @@ impl Ladder {
             world.is_some_and(|world| world.is_still(key, &new.grid, x, y))
         };
         let orders_alone = self.choice == Choice::World;
-        self.evidence.update(pool, &new.lattice, predictions.as_mut(), is_still, orders_alone);
+        self.evidence.update(pool, key, &new.lattice, predictions.as_mut(), is_still, orders_alone);
     }
 
     /// Works out what the rungs need of `key`, but for the affine maps.
@@ -444,12 +450,15 @@ fn fill_mixed(filling: &Filling<'_>, evidence: &Evidence, run: Run<'_>) {
     let has_depth = !key.depth.data().is_empty();
     let cells = (run.x..).zip(run.velocity.iter_mut().zip(run.acceleration));
     for (x, (velocity, acceleration)) in cells {
-        let rung = if models.is_led_by_late_camera(key, x, run.y) {
-            Rung::World(evidence.order())
+        let lead = if models.is_led_by_late_camera(key, x, run.y) {
+            Lead::by(Rung::World(evidence.order()))
         } else {
             let depth = if has_depth { key.depth.at(x, run.y) } else { 0 };
-            evidence.rung_at(x, run.y, depth)
+            evidence.lead_at(x, run.y, depth)
         };
-        (*velocity, *acceleration) = filling.one(rung, x, run.y);
+        (*velocity, *acceleration) = match lead.part() {
+            Some(part) => filling.part_of_motion(part, x, run.y),
+            None => filling.one(lead.rung, x, run.y),
+        };
     }
 }
