@@ -17,10 +17,11 @@ use foreframe_perception::display::DisplayProfile;
 use serde::{Deserialize, Deserializer};
 use tracing_subscriber::EnvFilter;
 
+use crate::hud::HudView;
 use crate::sink::window::WindowOptions;
 
 /// Arguments of `foreframed` and of `foreframe serve`.
-#[derive(clap::Args, Deserialize, Clone, Debug, Default)]
+#[derive(clap::Args, Deserialize, Clone, PartialEq, Debug, Default)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 #[group(id = "daemon")]
 pub struct Args {
@@ -50,6 +51,15 @@ pub struct Args {
     #[arg(long)]
     #[serde(default, deserialize_with = "from_name")]
     pub method: Option<Method>,
+    /// Show at most so many frames a second, 1 to 1000, for a sink without a rate of its own
+    /// [default: every refresh]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    pub cap: Option<f64>,
+    /// What to draw into the pictures of windows: off, stats, motion, grid, rungs, tear, only-real
+    /// or only-synthesised; `h` in a window goes through them [default: off]
+    #[arg(long, value_name = "VIEW")]
+    #[serde(default, deserialize_with = "from_name")]
+    pub hud: Option<HudView>,
     /// Record what the applications send into this capture
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
@@ -108,6 +118,12 @@ impl SinkSpec {
     #[must_use]
     pub fn keeps_frames(&self) -> bool {
         !matches!(self, Self::Null | Self::Shm | Self::Window)
+    }
+
+    /// Whether frames have to come at a rate that is not ours to change: a file's, or a display's.
+    #[must_use]
+    pub fn has_own_rate(&self) -> bool {
+        self.keeps_frames() || *self == Self::Window
     }
 }
 
@@ -214,6 +230,10 @@ pub struct Config {
     pub backend: BackendChoice,
     /// How in-between frames are made.
     pub method: Method,
+    /// Most frames shown a second, Hz.
+    pub cap: Option<f64>,
+    /// What is drawn into the pictures of windows.
+    pub hud: HudView,
     /// Capture to write.
     pub record: Option<PathBuf>,
     /// Threads per stream.
@@ -263,6 +283,8 @@ impl Args {
             refresh: self.refresh.or(file.refresh),
             backend: self.backend.or(file.backend),
             method: self.method.or(file.method),
+            cap: self.cap.or(file.cap),
+            hud: self.hud.or(file.hud),
             record: self.record.or(file.record),
             threads: self.threads.or(file.threads),
             ppd: self.ppd.or(file.ppd),
@@ -280,6 +302,15 @@ impl Args {
         ensure((1.0..=1000.0).contains(&refresh), || {
             format!("--refresh: expected 1 to 1000 Hz, found {refresh}")
         })?;
+        if let Some(cap) = self.cap {
+            ensure((1.0..=1000.0).contains(&cap), || {
+                format!("--cap: expected 1 to 1000 Hz, found {cap}")
+            })?;
+            let sink = self.sink.clone().unwrap_or_default();
+            ensure(!sink.has_own_rate(), || {
+                format!("--cap: expected a sink without a rate of its own, found {sink}")
+            })?;
+        }
         if let Some(ppd) = self.ppd {
             ensure((1.0..=1000.0).contains(&ppd), || {
                 format!("--ppd: expected 1 to 1000 pixels per degree, found {ppd}")
@@ -308,6 +339,8 @@ impl Args {
             refresh_interval,
             backend: self.backend.unwrap_or(BackendChoice::Auto),
             method: self.method.unwrap_or_default(),
+            cap: self.cap,
+            hud: self.hud.unwrap_or_default(),
             record: self.record,
             threads: self.threads.unwrap_or(processors),
             pixels_per_degree: self.ppd.or_else(|| profile.as_ref().and_then(profile_ppd)),
@@ -317,6 +350,38 @@ impl Args {
             memory_per_client: memory_mb << 20,
             stop_within: STOP_WITHIN,
         })
+    }
+}
+
+impl Config {
+    /// Time from one planned picture to the next: as many refreshes as the cap asks for.
+    #[must_use]
+    pub fn frame_interval(&self) -> MonoSpan {
+        let Some(cap) = self.cap else { return self.refresh_interval };
+        let refreshes = 1e9 / cap / self.refresh_interval.as_ns() as f64;
+        // A cap of 59.94 on a display of 120 Hz means every second refresh.
+        #[expect(clippy::cast_possible_truncation, reason = "at most a thousand")]
+        let refreshes = (refreshes - 0.01).ceil().max(1.0) as i64;
+        self.refresh_interval.scale(refreshes, 1)
+    }
+
+    /// Names of the options that differ in `new` and that running streams cannot take over.
+    #[must_use]
+    pub fn needs_restart(&self, new: &Self) -> Vec<&'static str> {
+        let differs = [
+            ("socket", self.socket != new.socket),
+            ("sink", self.sink != new.sink),
+            ("fullscreen", self.window.is_fullscreen != new.window.is_fullscreen),
+            ("monitor", self.window.monitor != new.window.monitor),
+            ("refresh", self.refresh_interval != new.refresh_interval),
+            ("backend", self.backend != new.backend),
+            ("threads", self.threads != new.threads),
+            ("ppd", self.pixels_per_degree != new.pixels_per_degree),
+            ("log", self.log != new.log),
+            ("max-clients", self.max_clients != new.max_clients),
+            ("memory-mb", self.memory_per_client != new.memory_per_client),
+        ];
+        differs.into_iter().filter_map(|(name, differs)| differs.then_some(name)).collect()
     }
 }
 
@@ -365,6 +430,8 @@ mod tests {
         ("refresh", "144", "144"),
         ("backend", "cpu", "'cpu'"),
         ("method", "hold", "'hold'"),
+        ("cap", "50", "50"),
+        ("hud", "grid", "'grid'"),
         ("record", "a.mcap", "'a.mcap'"),
         ("threads", "3", "3"),
         ("ppd", "56", "56"),
@@ -374,6 +441,35 @@ mod tests {
         ("max-clients", "2", "2"),
         ("memory-mb", "64", "64"),
     ];
+
+    #[test]
+    fn a_cap_is_a_whole_number_of_refreshes() {
+        for (line, expected_hz) in [
+            ("--refresh 120", 120.0),
+            ("--refresh 120 --cap 144", 120.0),
+            ("--refresh 120 --cap 120", 120.0),
+            ("--refresh 120 --cap 90", 60.0),
+            ("--refresh 120 --cap 59.94", 60.0),
+            ("--refresh 144 --cap 50", 48.0),
+        ] {
+            let interval = flags(line).resolve().unwrap().frame_interval();
+            let hz = 1e9 / interval.as_ns() as f64;
+            assert!((hz - expected_hz).abs() < 0.01, "{line}: {hz}");
+        }
+        let error = flags("--cap 60 --sink y4m:x").resolve().unwrap_err();
+        assert!(error.to_string().contains("rate of its own"), "{error}");
+    }
+
+    #[test]
+    fn every_option_that_differs_can_change_in_place_or_needs_a_restart() {
+        let default = flags("").resolve().unwrap();
+        for (name, on_line, _) in EVERY_OPTION {
+            let changed = flags(&format!("--{name} {on_line}")).resolve().unwrap();
+            let named = default.needs_restart(&changed);
+            let in_place = ["method", "cap", "hud", "record"].contains(&name);
+            assert_eq!(named, if in_place { vec![] } else { vec![name] });
+        }
+    }
 
     #[test]
     fn every_option_means_the_same_in_the_file_as_on_the_command_line() {

@@ -5,12 +5,17 @@
 //! ([`server`]), copied and turned into pictures by the thread of its [`stream`], and leaves
 //! through a [`sink`] or to subscribers. The [`recorder`] keeps what came in as a [`capture`].
 //! [`ingest`] translates the protocol's words into the engine's, [`clock`] is the only reader of
-//! clocks, [`config`] says what was asked for, [`gpu`] what the machine has for it.
+//! clocks, [`config`] says what was asked for, [`gpu`] what the machine has for it, and through
+//! [`control`] people see what runs and change it. A [`hud`], made with [`draw`], says it in the
+//! picture.
 
 pub mod capture;
 pub mod clock;
 pub mod config;
+pub mod control;
+pub mod draw;
 pub mod gpu;
+pub mod hud;
 pub mod ingest;
 pub mod recorder;
 pub mod server;
@@ -31,11 +36,13 @@ pub use server::{Daemon, Stopper};
 /// # Errors
 /// In one line, what was expected and what was found, if the daemon cannot start.
 pub fn run(args: Args) -> anyhow::Result<()> {
-    let config = args.resolve()?;
+    let config = args.clone().resolve()?;
     start_log(&config.log);
     let signals = server::stop_signals()?;
+    let hangup = server::reload_signal()?;
     let mut daemon = Daemon::bind(config)?;
     daemon.stop_on(signals)?;
+    daemon.reload_from(args, hangup)?;
     daemon.run()
 }
 

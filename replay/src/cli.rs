@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    adapters, bench, completions, demo, export, import, info, man, pacing, perception, replay,
-    scenes, score, serve, stability,
+    adapters, bench, completions, ctl, demo, export, import, info, man, pacing, perception, replay,
+    scenes, score, serve, stability, top,
 };
 use crate::output::Output;
 use foreframed::UsageError;
@@ -31,6 +31,10 @@ pub enum Command {
     Demo(demo::Args),
     /// Run the daemon (the same as `foreframed`).
     Serve(serve::Args),
+    /// Watch a running daemon: rates, latency by stage, headroom, warnings.
+    Top(top::Args),
+    /// Change a running daemon: method, recording, cap, HUD.
+    Ctl(ctl::Args),
     /// List the built-in scenes, or write one as a capture.
     Scenes(scenes::Args),
     /// Turn a folder of EXR frames and JSON side-cars into a capture.
@@ -86,6 +90,8 @@ impl Cli {
         match self.command {
             Command::Demo(args) => demo::run(&args, &output),
             Command::Serve(args) => serve::run(args),
+            Command::Top(args) => top::run(&args, &output),
+            Command::Ctl(args) => ctl::run(&args, &output),
             Command::Scenes(args) => scenes::run(&args, &output),
             Command::Import(args) => import::run(&args, &output),
             Command::Export(args) => export::run(&args, &output),

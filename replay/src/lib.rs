@@ -8,7 +8,6 @@ pub mod bench;
 pub mod cli;
 pub mod commands;
 pub mod demo;
-pub mod draw;
 pub mod exr_frames;
 pub mod html;
 pub mod options;
@@ -17,4 +16,7 @@ pub mod pictures;
 pub mod recording;
 pub mod score;
 pub mod stability;
+pub mod top;
 pub mod virtual_time;
+
+pub use foreframed::draw;

@@ -13,6 +13,7 @@ use crate::backend::gpu::Gpu;
 use crate::backend::{BackendStatus, FrameInput};
 use crate::color::ColorPlane;
 use crate::decode::{DecodeError, DecodeScratch, decode_key};
+use crate::evidence::Evidence;
 use crate::field::FieldMap;
 use crate::finish::{Finish, FinishConfig};
 use crate::format::{DepthMeaning, StreamFormat};
@@ -146,10 +147,45 @@ impl Engine {
         self.backend.use_gpu(gpu, self.format.color, self.config.method.warp(), finishes);
     }
 
+    /// Makes in-between frames by `method` from now on, on `gpu` where there is one and none has
+    /// failed in this stream. Until the next key surfaces go on as they did; methods that look back
+    /// further learn anew.
+    pub fn set_method(&mut self, method: Method, gpu: Option<&Arc<Gpu>>) {
+        if method == self.config.method {
+            return;
+        }
+        self.config.method = method;
+        self.ladder = Ladder::new(method, self.config.pixels_per_degree);
+        let has_failed = self.backend.status().fell_back.is_some();
+        self.backend.restart();
+        if let Some(gpu) = gpu.filter(|_| !has_failed) {
+            self.use_gpu(gpu);
+        }
+        let (pool, map) = (Arc::clone(&self.pool), &self.scratch.map);
+        let backend = &mut self.backend;
+        pool.install(|| {
+            for key in self.previous.iter().chain(&self.newest) {
+                backend.take_key(&pool, method.warp(), key, map);
+            }
+        });
+    }
+
     /// What makes the pictures, and why it is not what was asked for.
     #[must_use]
     pub fn backend(&self) -> &BackendStatus {
         self.backend.status()
+    }
+
+    /// How in-between frames are made.
+    #[must_use]
+    pub fn method(&self) -> Method {
+        self.config.method
+    }
+
+    /// The newest key, where the cells of its field lie, and what the last keys have shown.
+    pub(crate) fn newest_seen(&self) -> Option<(&KeyFrame, &FieldMap, Option<&Evidence>)> {
+        let evidence = self.ladder.as_ref().map(Ladder::evidence);
+        self.newest.as_ref().map(|key| (key, &self.scratch.map, evidence))
     }
 
     /// What the stream declared.
@@ -196,8 +232,12 @@ impl Engine {
             if key.motion_from.is_some() {
                 self.scratch.decode.hand_displacement(&mut key);
             }
-            let older = self.newest.as_ref().filter(|_| !key.is_cut);
-            ladder.take_key(&self.pool, &mut key, older, self.previous.as_ref());
+            // Keys from before a change of method lack what the ladder keeps of a key.
+            let is_known =
+                |key: &&KeyFrame| key.motion_from.is_none() || !key.displacement.data().is_empty();
+            let older = self.newest.as_ref().filter(|_| !key.is_cut).filter(is_known);
+            let oldest = self.previous.as_ref().filter(is_known);
+            ladder.take_key(&self.pool, &mut key, older, oldest);
         }
         if !key.velocity.data().is_empty() {
             let cells = [key.velocity.width(), key.velocity.height()];

@@ -23,6 +23,7 @@ pub mod field;
 pub mod fill;
 pub mod finish;
 pub mod format;
+pub mod inspect;
 pub mod kernels;
 pub mod key;
 mod lanes;

@@ -6,12 +6,14 @@
 //! start a stream's threads, and to map the pool that a client hands over. Whatever a client does
 //! wrong ends that client's session ([`Server::fail`]) and nothing else.
 //!
+//! - [`control`]: what people ask of the daemon while it runs
 //! - [`connections`]: accept, handshake, read, end
 //! - [`requests`]: what each message of a client leads to
 //! - [`streams`]: streams and the events of their threads
 //! - [`subscriptions`]: who gets which output frames
 
 mod connections;
+mod control;
 mod requests;
 mod streams;
 mod subscriptions;
@@ -33,7 +35,7 @@ use tracing::{info, warn};
 
 use crate::capture::{CaptureSource, DISPLAY_ORIGIN, PIXELS_PER_DEGREE, SessionInfo};
 use crate::clock;
-use crate::config::{Config, SinkSpec};
+use crate::config::{Args, Config, SinkSpec};
 use crate::gpu::Gpus;
 use crate::recorder::Recorder;
 use crate::session::Session;
@@ -71,6 +73,12 @@ impl Stopper {
 #[derive(Debug)]
 struct Server {
     config: Config,
+    /// Where applications connect.
+    socket: PathBuf,
+    /// What the configuration was made from, to be read again.
+    told: Option<Args>,
+    /// Open connections to the control socket.
+    controllers: usize,
     terms: Terms,
     handle: LoopHandle<'static, Server>,
     signal: LoopSignal,
@@ -137,6 +145,9 @@ impl Daemon {
         };
         let mut server = Server {
             config,
+            socket: path.clone(),
+            told: None,
+            controllers: 0,
             terms,
             handle: handle.clone(),
             signal: event_loop.get_signal(),
@@ -155,6 +166,7 @@ impl Daemon {
         };
 
         info!(socket = %listener.path().display(), "listening");
+        server.listen_for_control(&path)?;
         let source = Generic::new(listener, Interest::READ, Mode::Level);
         let on_connection = |_, listener: &mut _, server: &mut Server| {
             let listener: &mut calloop::generic::NoIoDrop<Listener> = listener;
@@ -189,6 +201,20 @@ impl Daemon {
         Ok(())
     }
 
+    /// Resolves `args` again when it is told to reload, by `foreframe ctl reload` or by SIGHUP.
+    ///
+    /// # Errors
+    /// If the main loop cannot watch for the signal.
+    pub fn reload_from(&mut self, args: Args, hangup: Signals) -> anyhow::Result<()> {
+        self.server.told = Some(args);
+        insert(&self.event_loop.handle(), hangup, |_, (), server| {
+            if let Err(refused) = server.reload() {
+                warn!("{refused}");
+            }
+        })?;
+        Ok(())
+    }
+
     /// Stops the daemon from elsewhere.
     #[must_use]
     pub fn stopper(&self) -> Stopper {
@@ -214,6 +240,14 @@ impl Daemon {
 /// If the process has no descriptor left.
 pub fn stop_signals() -> anyhow::Result<Signals> {
     Signals::new(&[Signal::SIGINT, Signal::SIGTERM]).context("watching for signals")
+}
+
+/// The signal on which the daemon reads its configuration again. Made before any thread is.
+///
+/// # Errors
+/// If the process has no descriptor left.
+pub fn reload_signal() -> anyhow::Result<Signals> {
+    Signals::new(&[Signal::SIGHUP]).context("watching for signals")
 }
 
 impl Server {

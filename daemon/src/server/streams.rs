@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 
 use anyhow::Context as _;
-use foreframe_engine::{EngineConfig, StreamFormat as EngineFormat};
+use foreframe_engine::{EngineConfig, MonoTime, StreamFormat as EngineFormat};
 use foreframe_protocol::memory::ReadOnlyPool;
 use foreframe_protocol::{
     CreateStream, EndReason, ErrorCode, OutputFrame, Pacing, Presented, ReleaseReason,
@@ -14,6 +14,7 @@ use tracing::{debug, error, info};
 
 use super::Server;
 use crate::clock::{self, Waker};
+use crate::control::StreamStatus;
 use crate::ingest::{self, KeyOrder};
 use crate::session::fault::Fault;
 use crate::sink::Sink;
@@ -37,6 +38,9 @@ pub(super) struct Stream {
     pub(super) pool: Option<Pool>,
     /// Bytes that it costs its client, pool included.
     pub(super) cost: u64,
+    /// What it reported last, and when.
+    pub(super) report: StreamStatus,
+    pub(super) reported_at: Option<MonoTime>,
     /// There once it has been told to end.
     end: Option<EndReason>,
     thread: Option<JoinHandle<()>>,
@@ -106,7 +110,7 @@ impl Server {
                     worker_started: thread::ask_for_real_time_work,
                     ..EngineConfig::new(config.method, config.threads)
                 },
-                refresh_interval: config.refresh_interval,
+                refresh_interval: config.frame_interval(),
                 display_origin: self.display_origin,
             },
             gpu: chosen.map(|index| (Arc::clone(&self.gpus), index)),
@@ -114,6 +118,7 @@ impl Server {
             events: self.events.clone(),
             sink,
             window: self.window(&format, ordinal),
+            hud: config.hud,
             recorder: self.recorder.as_ref().map(|it| it.stream(number_in_file)),
         })
         .context("starting the stream's thread")?;
@@ -129,6 +134,8 @@ impl Server {
                 order: KeyOrder::default(),
                 pool: None,
                 cost,
+                report: StreamStatus::default(),
+                reported_at: None,
                 end: None,
                 thread: Some(thread),
             },
@@ -145,7 +152,7 @@ impl Server {
 
     /// Passes on what a stream's thread tells.
     pub(super) fn on_stream_event(&mut self, FromStream { ordinal, event }: FromStream) {
-        let Some(stream) = self.streams.get(&ordinal) else { return };
+        let Some(stream) = self.streams.get_mut(&ordinal) else { return };
         let (session, number) = (stream.session, stream.create.stream);
         match event {
             StreamEvent::SlotCopied(slot) => self.send(
@@ -169,6 +176,10 @@ impl Server {
             }
             StreamEvent::Pacing(pacing) => {
                 self.offer(session, Pacing { stream: number, ..pacing });
+            }
+            StreamEvent::Report(report) => {
+                stream.report = *report;
+                stream.reported_at = Some(clock::now());
             }
             StreamEvent::Output(subscriber, frame) => self.on_output(ordinal, subscriber, frame),
             StreamEvent::Ended { has_panicked } => self.on_stream_ended(ordinal, has_panicked),

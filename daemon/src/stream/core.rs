@@ -10,6 +10,7 @@ use std::sync::Arc;
 use foreframe_engine::backend::BackendStatus;
 use foreframe_engine::backend::gpu::Gpu;
 use foreframe_engine::engine::MotionState;
+use foreframe_engine::inspect::Inspection;
 use foreframe_engine::pacing::{
     Pacer, PacerConfig, PacerStatus, Plan, RefreshKind, TimerDisplay, WorkEstimate,
 };
@@ -218,7 +219,8 @@ impl StreamCore {
         self.display = Display::Told;
     }
 
-    /// Shows the pictures on a timer of this interval, in a stream that has had no key.
+    /// Shows the pictures on a timer of this interval from now on. What is known of another display
+    /// is forgotten.
     pub fn use_timer(&mut self, refresh_interval: MonoSpan, origin: MonoTime) {
         self.pacer = new_pacer(self.method, refresh_interval, Some(origin));
         self.display = Display::Timer(TimerDisplay::new(origin, refresh_interval));
@@ -239,6 +241,19 @@ impl StreamCore {
     #[must_use]
     pub fn backend(&self) -> &BackendStatus {
         self.engine.backend()
+    }
+
+    /// Makes in-between frames by another method from now on, on `gpu` where there is one.
+    pub fn set_method(&mut self, method: Method, gpu: Option<&Arc<Gpu>>) {
+        self.method = method;
+        self.engine.set_method(method, gpu);
+        self.pacer.set_interpolates(method.interpolates());
+    }
+
+    /// What the engine makes of the newest key; None before the first.
+    #[must_use]
+    pub fn inspect(&self) -> Option<Inspection<'_>> {
+        self.engine.inspect()
     }
 
     /// Takes in a key. `clock` says when that is done: from then on it can be shown.

@@ -2,13 +2,15 @@
 
 use std::collections::VecDeque;
 
-use foreframe_engine::MonoTime;
 use foreframe_engine::pacing::Plan;
+use foreframe_engine::{ColorPlane, MonoTime};
 use foreframe_protocol::Presented;
 use tracing::{debug, info, warn};
 
-use super::core::{StreamCore, Told};
+use super::core::{PresentedFrame, StreamCore, Told};
 use crate::clock;
+use crate::control::StreamStatus;
+use crate::hud::{Hud, HudView};
 use crate::sink::window::{Feedback, Window, WindowConfig, WindowEvent, WindowOpener};
 
 /// Keys whose first picture was handed over and not heard of yet. A display that answers nothing is
@@ -25,6 +27,9 @@ pub(super) struct WindowDisplay {
     /// Oldest first.
     awaited: VecDeque<Presented>,
     shown: Vec<Presented>,
+    hud: Hud,
+    /// The picture on display where it is not the engine's: with a HUD in it.
+    picture: ColorPlane,
 }
 
 impl WindowDisplay {
@@ -32,6 +37,7 @@ impl WindowDisplay {
     pub(super) fn open(
         opener: &WindowOpener,
         config: &WindowConfig,
+        view: HudView,
         core: &mut StreamCore,
         wake: impl Fn() + Send + Sync + 'static,
     ) -> Option<Self> {
@@ -42,7 +48,11 @@ impl WindowDisplay {
         let announced = window.refresh_interval();
         info!(window = config.title, pacing = feedback.name(), ?announced, "window is paced");
         let (awaited, shown) = (VecDeque::new(), Vec::new());
-        let mut display = Self { window, feedback, is_rate_corrected: false, awaited, shown };
+        let mut hud = Hud::default();
+        hud.set_view(view);
+        let picture = ColorPlane::default();
+        let mut display =
+            Self { window, feedback, is_rate_corrected: false, awaited, shown, hud, picture };
         match feedback {
             Feedback::Timer => {
                 announced.into_iter().for_each(|it| core.use_timer(it, clock::now()));
@@ -54,10 +64,48 @@ impl WindowDisplay {
     }
 
     /// Hands over the picture that was just made, not sooner than its plan allows.
-    pub(super) fn show(&mut self, plan: &Plan, core: &mut StreamCore) {
-        clock::sleep_until(plan.submit_from);
-        let is_taken = self.window.present(plan.present_at, core.frame());
+    pub(super) fn show(&mut self, plan: &Plan, frame: &PresentedFrame, core: &mut StreamCore) {
+        let is_taken = if self.hud.view() == HudView::Off {
+            clock::sleep_until(plan.submit_from);
+            self.window.present(plan.present_at, core.frame())
+        } else {
+            self.draw_hud(frame, core);
+            clock::sleep_until(plan.submit_from);
+            self.window.present(plan.present_at, &self.picture)
+        };
         core.on_handed_over(plan, clock::now(), is_taken);
+    }
+
+    /// Copies the picture that was just made and draws the HUD into it. Frames of a kind that the
+    /// HUD hides leave the picture before in place.
+    fn draw_hud(&mut self, frame: &PresentedFrame, core: &mut StreamCore) {
+        let made = core.frame();
+        let has_size =
+            (self.picture.width(), self.picture.height()) == (made.width(), made.height());
+        if !self.hud.view().shows(frame.kind) && has_size {
+            return;
+        }
+        self.picture.reset(made.format(), made.width(), made.height());
+        self.picture.copy_from(made);
+        self.hud.draw(frame, core.inspect(), &mut self.picture);
+    }
+
+    /// Draws something else into the pictures from now on.
+    pub(super) fn set_hud(&mut self, view: HudView) {
+        info!(%view, "hud");
+        self.hud.set_view(view);
+    }
+
+    /// Adds to a report what the window knows, and shows it in the HUD.
+    pub(super) fn report(&mut self, report: &mut StreamStatus) {
+        self.feedback.name().clone_into(&mut report.paced_by);
+        if self.feedback != Feedback::Presentation {
+            report.warnings.push(format!("the display is paced by {}", self.feedback.name()));
+        }
+        if self.is_rate_corrected {
+            report.warnings.push("the display announces a wrong refresh rate".to_owned());
+        }
+        self.hud.report(report);
     }
 
     /// Takes in what happened to the window; false once it is closed, and `core` on a timer again.
@@ -72,6 +120,7 @@ impl WindowDisplay {
                     warn!(pacing = feedback.name(), was = self.feedback.name(), "another pacing");
                     self.feedback = feedback;
                 }
+                WindowEvent::Key('h') => self.set_hud(self.hud.view().next()),
                 WindowEvent::Key(key) => debug!(%key, "a key that nothing is bound to"),
                 WindowEvent::Closed(why) => {
                     let pacing = core.pacing();

@@ -11,6 +11,7 @@ use foreframe_protocol::memory::ReadOnlyPool;
 use foreframe_protocol::slots::{SlotTable, SlotUse};
 use foreframe_protocol::{Error, LateCamera, Submit};
 
+use super::command::StreamCommand;
 use super::outlet::Outlet;
 use super::reaper::Reaped;
 use crate::clock::Waker;
@@ -69,6 +70,7 @@ struct State {
     waiting: Option<Submission>,
     /// The pose of the newest content time that was not taken out yet, and when it came in.
     late_camera: Option<(LateCamera, MonoTime)>,
+    commands: Vec<StreamCommand>,
     counts: KeyCounts,
     outlets: Outlets,
     is_closed: bool,
@@ -82,6 +84,7 @@ impl Mailbox {
             slots: SlotTable::new(slots),
             waiting: None,
             late_camera: None,
+            commands: Vec::new(),
             counts: KeyCounts::default(),
             outlets: Arc::default(),
             is_closed: false,
@@ -149,6 +152,17 @@ impl Mailbox {
     /// Takes the late camera out, with the time when it came in.
     pub fn take_late_camera(&self) -> Option<(LateCamera, MonoTime)> {
         self.lock().late_camera.take()
+    }
+
+    /// Tells the stream to do something differently.
+    pub fn command(&self, command: StreamCommand) {
+        self.lock().commands.push(command);
+        self.waker.wake();
+    }
+
+    /// What the stream was told since the last call, in order.
+    pub fn take_commands(&self) -> Vec<StreamCommand> {
+        std::mem::take(&mut self.lock().commands)
     }
 
     /// The planes of the key frame that was taken out are copied: its slot is the client's again.

@@ -3,18 +3,23 @@
 //! The main loop [`start`](thread::start)s a stream, puts checked submissions into its [`mailbox`],
 //! and hears of everything else through [`StreamEvent`]s. The [`thread`] copies planes out of the
 //! pool ([`planes`]), drives the [`core`], and hands pictures to subscribers ([`outlet`]), to a
-//! sink, to the window ([`display`]) and key frames to the recorder. Whatever is slow to drop goes to the [`reaper`], and pools
+//! sink, to the window ([`display`]) and key frames to the recorder. What it is told to do
+//! differently is a [`command`], what it notices about itself is [`observed`]. Whatever is slow to
+//! drop goes to the [`reaper`], and pools
 //! for subscribers come from the [`allocator`].
 
 pub mod allocator;
+pub mod command;
 pub mod core;
 mod display;
 pub mod mailbox;
+pub mod observed;
 pub mod outlet;
 pub mod planes;
 pub mod reaper;
 pub mod thread;
 
+use crate::control::StreamStatus;
 use foreframe_protocol::slots::SlotUse;
 use foreframe_protocol::{ErrorMessage, OutputFrame, Pacing, Presented, Statistics};
 
@@ -31,6 +36,8 @@ pub enum StreamEvent {
     Statistics(Statistics),
     /// How a key frame met the display. Lacks the stream's number.
     Pacing(Pacing),
+    /// What people want to know. Lacks what the main loop knows.
+    Report(Box<StreamStatus>),
     /// A frame lies in a slot of an output pool of this session.
     Output(u32, OutputFrame),
     /// The thread has ended, and this is its last event.

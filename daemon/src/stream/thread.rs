@@ -11,7 +11,7 @@ use std::thread::{self, JoinHandle};
 
 use calloop::channel::Sender;
 use foreframe_engine::pacing::Plan;
-use foreframe_engine::{KeyReport, MonoSpan, MonoTime};
+use foreframe_engine::{KeyReport, Method, MonoSpan, MonoTime};
 use foreframe_protocol::{
     CreateStream, Error, ErrorCode, ErrorMessage, OutputFrame, OutputKind, Pacing, Presented,
     Statistics,
@@ -22,13 +22,17 @@ use thread_priority::{
 };
 use tracing::{debug, error, info, trace, warn};
 
+use super::command::StreamCommand;
 use super::core::{CoreConfig, DroppedFrame, FrameKind, FrameOutcome, PresentedFrame, StreamCore};
 use super::display::WindowDisplay;
 use super::mailbox::{Mailbox, Submission, Taken};
+use super::observed::{KeyInstants, Observed};
 use super::planes::{PlaneCopier, SlotPlanes};
 use super::{FromStream, StreamEvent};
 use crate::clock::{self, Alarm, Woken};
+use crate::control::StreamStatus;
 use crate::gpu::Gpus;
+use crate::hud::HudView;
 use crate::ingest::{self, IngestError, PlaneSource};
 use crate::recorder::StreamRecorder;
 use crate::sink::window::{WindowConfig, WindowOpener};
@@ -61,6 +65,8 @@ pub struct StreamParts {
     pub sink: Option<SinkWorker>,
     /// The window to show pictures in, if there is to be one.
     pub window: Option<(WindowOpener, WindowConfig)>,
+    /// What to draw into the pictures of the window.
+    pub hud: HudView,
     /// Takes keys, if the daemon records.
     pub recorder: Option<StreamRecorder>,
 }
@@ -109,12 +115,14 @@ struct StreamThread {
     /// What taking in the newest key took.
     key_work: MonoSpan,
     synthesis: Mean,
+    observed: Observed,
+    method: Method,
     statistics_due_at: MonoTime,
 }
 
 struct Unshown {
     key_index: u64,
-    received_at_ns: u64,
+    instants: KeyInstants,
 }
 
 /// Mean of what was added.
@@ -135,10 +143,11 @@ impl StreamThread {
                 Err(error) => warn!(%error, "the CPU makes the pictures"),
             }
         }
+        let method = parts.core.engine.method;
         info!(stream = parts.ordinal, backend = core.backend().name, "stream starts");
         let window = parts.window.as_ref().and_then(|(opener, config)| {
             let mailbox = Arc::clone(&parts.mailbox);
-            WindowDisplay::open(opener, config, &mut core, move || mailbox.waker.wake())
+            WindowDisplay::open(opener, config, parts.hud, &mut core, move || mailbox.waker.wake())
         });
         Self {
             parts,
@@ -152,6 +161,8 @@ impl StreamThread {
             told_of_fall: false,
             key_work: MonoSpan::ZERO,
             synthesis: Mean::default(),
+            observed: Observed::default(),
+            method,
             statistics_due_at: clock::now(),
         }
     }
@@ -163,6 +174,7 @@ impl StreamThread {
         ask_for_real_time();
         let mailbox = Arc::clone(&self.parts.mailbox);
         loop {
+            self.follow_commands();
             match mailbox.take() {
                 Taken::Closed => break,
                 Taken::Key(submission) => {
@@ -194,6 +206,32 @@ impl StreamThread {
         self.send_statistics();
     }
 
+    fn follow_commands(&mut self) {
+        for command in self.parts.mailbox.take_commands() {
+            match command {
+                StreamCommand::Method(method) => {
+                    let gpu = self.parts.gpu.as_ref();
+                    let gpu = gpu.and_then(|(gpus, index)| gpus.open(*index).ok());
+                    self.core.set_method(method, gpu.as_ref());
+                    self.method = method;
+                }
+                StreamCommand::Record(recorder) => {
+                    self.parts.recorder = recorder;
+                    if let Some(recorder) = &mut self.parts.recorder {
+                        recorder.announce(&self.parts.create);
+                    }
+                }
+                StreamCommand::Interval(interval) => {
+                    self.core.use_timer(interval, self.parts.core.display_origin);
+                }
+                StreamCommand::Hud(view) => match &mut self.window {
+                    Some(window) => window.set_hud(view),
+                    None => debug!(%view, "no window to show a HUD in"),
+                },
+            }
+        }
+    }
+
     /// Makes the next picture from the keys so far, if taking in the one that waits would cost its
     /// refresh: that refresh could not show the new key anyway.
     fn make_picture_first(&mut self) {
@@ -222,8 +260,14 @@ impl StreamThread {
         self.key_work = clock::now() - started_at;
         self.repeats_in_a_row = 0;
         self.owes_picture = true;
-        self.unshown =
-            Some(Unshown { key_index: submit.key_index, received_at_ns: arrived_at.as_ns() });
+        self.unshown = Some(Unshown {
+            key_index: submit.key_index,
+            instants: KeyInstants {
+                arrived_at: *arrived_at,
+                latched_at: started_at,
+                taken_in_at: started_at + self.key_work,
+            },
+        });
         self.send_pacing(submit.key_index);
     }
 
@@ -268,6 +312,10 @@ impl StreamThread {
         let outcome = self.core.make(plan, clock::now);
         self.watch_backend();
         let Some(outcome) = outcome else { return };
+        let ready_at = clock::now();
+        if outcome != FrameOutcome::Repeated {
+            self.observed.picture(ready_at, plan.present_at);
+        }
         match outcome {
             FrameOutcome::Repeated => self.repeats_in_a_row += 1,
             FrameOutcome::Dropped(DroppedFrame { kind, work }) => {
@@ -278,14 +326,15 @@ impl StreamThread {
                 trace!(?frame, "frame presented");
                 self.repeats_in_a_row = 0;
                 if let Some(window) = &mut self.window {
-                    window.show(plan, &mut self.core);
+                    window.show(plan, &frame, &mut self.core);
                 }
-                self.deliver(&frame);
+                self.deliver(&frame, ready_at);
             }
         }
         if self.statistics_due_at <= plan.present_at {
             self.statistics_due_at = plan.present_at + STATISTICS_INTERVAL;
             self.send_statistics();
+            self.send_report();
         }
     }
 
@@ -304,6 +353,7 @@ impl StreamThread {
     fn add_work(&mut self, kind: FrameKind, work: MonoSpan) {
         if kind == FrameKind::Synthesised {
             self.synthesis.add(work);
+            self.observed.synthesised(work);
         }
     }
 
@@ -315,7 +365,7 @@ impl StreamThread {
         }
     }
 
-    fn deliver(&mut self, frame: &PresentedFrame) {
+    fn deliver(&mut self, frame: &PresentedFrame, ready_at: MonoTime) {
         self.add_work(frame.kind, frame.work);
         let phase_q12 = frame.phase.q12().unsigned_abs();
         for outlet in self.parts.mailbox.outlets().iter() {
@@ -342,12 +392,13 @@ impl StreamThread {
             sink.offer(frame.index, self.core.frame());
         }
         if let Some(key) = self.unshown.take_if(|key| key.key_index == frame.key_index) {
+            self.observed.key_shown(&key.instants, ready_at, frame.presented_at);
             let presented = Presented {
                 stream: 0,
                 phase_q12,
                 key_index: key.key_index,
                 content_time_ns: frame.content_time.as_ns(),
-                received_at_ns: key.received_at_ns,
+                received_at_ns: key.instants.arrived_at.as_ns(),
                 present_at_ns: frame.present_at.as_ns(),
                 presented_at_ns: frame.presented_at.as_ns(),
             };
@@ -385,6 +436,35 @@ impl StreamThread {
             dropped: frames.dropped,
             synthesis_mean_ns: self.synthesis.mean_ns(),
         }));
+    }
+
+    fn send_report(&mut self) {
+        let keys = self.parts.mailbox.counts();
+        let frames = self.core.counts();
+        let (rates_hz, on_target_percent) = self.observed.rates(clock::now(), frames);
+        let backend = self.core.backend();
+        let sink = self.parts.sink.as_ref().map_or(0, SinkWorker::left_out);
+        let fell = backend.fell_back.iter().map(|why| format!("the CPU took over: {why}"));
+        let sink = (sink > 0).then(|| format!("the sink was too slow for {sink} frames"));
+        let mut report = StreamStatus {
+            width: self.parts.create.format.width,
+            height: self.parts.create.format.height,
+            paced_by: "timer".to_owned(),
+            method: self.method.name().to_owned(),
+            backend: backend.name.clone(),
+            rates_hz,
+            on_target_percent,
+            latency_ms: self.observed.stages(),
+            ready_before_refresh: self.observed.headroom(),
+            keys: [keys.received, keys.superseded, keys.refused + self.refused],
+            frames: [frames.real, frames.synthesised, frames.repeated, frames.dropped],
+            warnings: fell.chain(sink).collect(),
+            ..StreamStatus::default()
+        };
+        if let Some(window) = &mut self.window {
+            window.report(&mut report);
+        }
+        self.send(StreamEvent::Report(Box::new(report)));
     }
 
     fn send(&self, event: StreamEvent) {

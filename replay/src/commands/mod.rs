@@ -3,6 +3,7 @@
 pub mod adapters;
 pub mod bench;
 pub mod completions;
+pub mod ctl;
 pub mod demo;
 pub mod export;
 pub mod import;
@@ -16,3 +17,4 @@ pub mod scenes;
 pub mod score;
 pub mod serve;
 pub mod stability;
+pub mod top;

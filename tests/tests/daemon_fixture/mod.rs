@@ -83,6 +83,11 @@ impl RunningDaemon {
     /// Stops it in good order and waits until it has.
     pub(crate) fn stop(&mut self) {
         self.stopper.stop();
+        self.join();
+    }
+
+    /// Waits until it has stopped, because somebody else asked it to.
+    pub(crate) fn join(&mut self) {
         if let Some(thread) = self.thread.take() {
             thread.join().expect("the daemon ends in good order");
         }

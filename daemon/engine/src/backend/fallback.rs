@@ -45,6 +45,13 @@ impl Backend {
         &self.status
     }
 
+    /// Forgets the GPU and the keys, and why the CPU took over, not.
+    pub(crate) fn restart(&mut self) {
+        let fell_back = self.status.fell_back.take();
+        *self =
+            Self { status: BackendStatus { fell_back, ..Default::default() }, ..Self::default() };
+    }
+
     /// Runs on `gpu` from the next key on, in a stream that has had none.
     /// It finishes pictures too where `finishes`.
     pub(crate) fn use_gpu(

@@ -5,6 +5,8 @@ use crate::format::{CameraMotion, MotionConvention, MotionDirection, MotionForma
 use crate::key::{Pixels, PlaneInput};
 use crate::plane::Rect;
 
+mod change_of_method;
+
 const SIZE: u32 = 16;
 
 fn format() -> StreamFormat {

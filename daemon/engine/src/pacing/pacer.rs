@@ -59,6 +59,11 @@ pub struct Pacer {
 }
 
 impl Pacer {
+    /// Whether pictures come from between the two newest keys from now on.
+    pub fn set_interpolates(&mut self, interpolates: bool) {
+        self.interpolates = interpolates;
+    }
+
     /// A pacer that has seen nothing.
     #[must_use]
     pub fn new(config: PacerConfig) -> Self {

@@ -1,4 +1,4 @@
-//! Drawing for the tool's own pictures: a canvas over tiny-skia, text over ab_glyph, and drawings
+//! Drawing for the HUD and for the pictures of the tool: a canvas over tiny-skia, text over ab_glyph, and drawings
 //! that become pixels or SVG.
 //!
 //! Software only and with a built-in font, so that a picture has the same pixels on every machine.

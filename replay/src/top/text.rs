@@ -1,0 +1,101 @@
+//! A status in plain text.
+
+use std::fmt::Write as _;
+
+use foreframed::control::{DaemonStatus, Spread, StreamStatus};
+
+/// Names of the classes of headroom.
+pub const HEADROOM: [&str; 6] = ["late", "< 1", "< 2", "< 4", "< 8", "more"];
+
+/// What a daemon does, in a few lines a stream.
+#[must_use]
+pub fn status(status: &DaemonStatus) -> String {
+    let mut out = headline(status);
+    out.push('\n');
+    for stream in &status.streams {
+        // Writing to a string cannot fail.
+        let _infallible = write!(out, "\n{}\n", stream_text(stream));
+    }
+    if status.streams.is_empty() {
+        out.push_str("no streams\n");
+    }
+    out
+}
+
+/// The daemon itself, in one line.
+#[must_use]
+pub fn headline(status: &DaemonStatus) -> String {
+    let DaemonStatus { version, method, sink, refresh_hz, clients, .. } = status;
+    let mut line = format!(
+        "foreframe {version}, up {:.0} s: {method} to {sink} at {refresh_hz:.2} Hz",
+        status.uptime_s
+    );
+    if let Some(cap) = status.cap_hz {
+        let _infallible = write!(line, ", capped at {cap:.2}");
+    }
+    let _infallible = write!(line, ", {clients} {}", plural(*clients, "client"));
+    if let Some(file) = &status.recording {
+        let _infallible = write!(line, ", recording to {}", file.display());
+    }
+    line
+}
+
+/// What a stream is, in one line.
+#[must_use]
+pub fn title(stream: &StreamStatus) -> String {
+    let StreamStatus { number, width, height, method, backend, paced_by, .. } = stream;
+    let idle = if stream.is_idle { ", idle" } else { "" };
+    format!("stream {number}: {width}x{height}, {method} on {backend}, paced by {paced_by}{idle}")
+}
+
+/// The stages of latency by name.
+#[must_use]
+pub fn stages(stream: &StreamStatus) -> [(&'static str, Spread); 6] {
+    let latency = &stream.latency_ms;
+    [
+        ("waited", latency.waited),
+        ("taken in", latency.taken_in),
+        ("made", latency.made),
+        ("until shown", latency.until_shown),
+        ("key, in all", latency.whole),
+        ("an in-between", latency.synthesis),
+    ]
+}
+
+fn stream_text(stream: &StreamStatus) -> String {
+    let mut out = title(stream);
+    let rates = &stream.rates_hz;
+    let _infallible = write!(
+        out,
+        "\n  a second: {:.1} keys, {:.1} real, {:.1} synthesised, {:.1} repeated, {:.1} dropped; \
+         {:.1} % on target",
+        rates.keys,
+        rates.real,
+        rates.synthesised,
+        rates.repeated,
+        rates.dropped,
+        stream.on_target_percent
+    );
+    let spread =
+        |(name, spread): (&str, Spread)| format!("{name} {:.2} ({:.2})", spread.p50, spread.p95);
+    let latency = stages(stream).map(spread).join(", ");
+    let _infallible = write!(out, "\n  median ms (95 %): {latency}");
+    let headroom = HEADROOM.iter().zip(stream.ready_before_refresh);
+    let headroom: Vec<_> = headroom.map(|(name, count)| format!("{name}: {count}")).collect();
+    let _infallible = write!(out, "\n  ready before its refresh, ms: {}", headroom.join(", "));
+    let [received, superseded, refused] = stream.keys;
+    let [real, synthesised, repeated, dropped] = stream.frames;
+    let _infallible = write!(
+        out,
+        "\n  since the start: {received} keys ({superseded} superseded, {refused} refused); \
+         {real} real, {synthesised} synthesised, {repeated} repeated, {dropped} dropped"
+    );
+    for warning in &stream.warnings {
+        let _infallible = write!(out, "\n  warning: {warning}");
+    }
+    out
+}
+
+fn plural(count: usize, word: &str) -> String {
+    if count == 1 { word.to_owned() } else { format!("{word}s") }
+}
