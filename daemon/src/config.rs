@@ -377,6 +377,8 @@ impl Config {
             ("backend", self.backend != new.backend),
             ("threads", self.threads != new.threads),
             ("ppd", self.pixels_per_degree != new.pixels_per_degree),
+            ("finish", self.finish.mode != new.finish.mode),
+            ("profile", FinishConfig { mode: new.finish.mode, ..self.finish } != new.finish),
             ("log", self.log != new.log),
             ("max-clients", self.max_clients != new.max_clients),
             ("memory-mb", self.memory_per_client != new.memory_per_client),
@@ -422,7 +424,7 @@ mod tests {
     }
 
     /// Every option with a value that is not its default, by the name that flag and file share.
-    const EVERY_OPTION: [(&str, &str, &str); 15] = [
+    const EVERY_OPTION: [(&str, &str, &str); 17] = [
         ("socket", "/run/x", "'/run/x'"),
         ("sink", "png:out", "'png:out'"),
         ("fullscreen", "", "true"),
@@ -467,7 +469,9 @@ mod tests {
             let changed = flags(&format!("--{name} {on_line}")).resolve().unwrap();
             let named = default.needs_restart(&changed);
             let in_place = ["method", "cap", "hud", "record"].contains(&name);
-            assert_eq!(named, if in_place { vec![] } else { vec![name] });
+            // A profile also says how large a pixel is.
+            assert_eq!(named.contains(&name), !in_place, "{name}: {named:?}");
+            assert!(!in_place || named.is_empty(), "{name}: {named:?}");
         }
     }
 

@@ -43,7 +43,7 @@ impl Inspection<'_> {
             (Method::Auto, Some(evidence)) if !evidence.samples().data().is_empty() => {
                 let depths = &self.key.depth;
                 let depth = if depths.data().is_empty() { 0 } else { depths.at(column, row) };
-                evidence.rung_at(column, row, depth)
+                evidence.lead_at(column, row, depth).rung
             }
             _ => Rung::Linear,
         }
