@@ -179,9 +179,9 @@ fn a_cap_thins_out_what_is_shown_and_can_be_taken_back() {
 fn nonsense_is_answered_or_cut_off_and_the_daemon_goes_on() {
     let daemon = RunningDaemon::start("shm");
     let mut raw = UnixStream::connect(control_path(&daemon.socket)).unwrap();
-    raw.write_all(b"hello\n{\"request\":\"stop\",\"now\":1}\n").unwrap();
+    raw.write_all(b"hello\n{\"request\":\"cap\",\"speed\":1}\n").unwrap();
     let mut answers = BufReader::new(raw.try_clone().unwrap()).lines();
-    for expected in ["as one JSON object", "stop"] {
+    for expected in ["as one JSON object", "speed"] {
         let answer = answers.next().unwrap().unwrap();
         assert!(answer.contains("refused") && answer.contains(expected), "{answer}");
     }
