@@ -111,6 +111,11 @@ enum Display {
     Told,
 }
 
+/// How long before a refresh compositors are expected to need a picture, until they show otherwise:
+/// with less, mutter without a GPU shows one frame in fifty late at 120 Hz (`window_pacing`).
+const FIRST_DEADLINE: MonoSpan = MonoSpan::from_ms(4);
+/// The same on fast displays, as a share of the refresh interval.
+const FIRST_DEADLINE_PERCENT: i64 = 55;
 /// Pictures under way at most; a display that answers nothing is not waited for.
 const UNDER_WAY: usize = 64;
 
@@ -215,7 +220,8 @@ impl StreamCore {
     /// key. `announced` is its refresh interval, if it names one.
     pub fn use_display(&mut self, announced: Option<MonoSpan>) {
         let refresh_interval = announced.unwrap_or(self.interval());
-        self.pacer = new_pacer(self.method, refresh_interval, None);
+        let deadline = FIRST_DEADLINE.min(refresh_interval.scale(FIRST_DEADLINE_PERCENT, 100));
+        self.pacer = new_pacer(self.method, refresh_interval, None).with_deadline(deadline);
         self.display = Display::Told;
     }
 

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use foreframe_engine::pacing::Plan;
 use foreframe_engine::{ColorPlane, MonoTime};
 use foreframe_protocol::Presented;
-use tracing::{debug, info, warn};
+use tracing::{debug, info, trace, warn};
 
 use super::core::{PresentedFrame, StreamCore, Told};
 use crate::clock;
@@ -73,7 +73,15 @@ impl WindowDisplay {
             clock::sleep_until(plan.submit_from);
             self.window.present(plan.present_at, &self.picture)
         };
-        core.on_handed_over(plan, clock::now(), is_taken);
+        let now = clock::now();
+        trace!(
+            planned = plan.present_at.as_ns(),
+            submit_by = plan.submit_by.as_ns(),
+            at = now.as_ns(),
+            is_taken,
+            "handed over"
+        );
+        core.on_handed_over(plan, now, is_taken);
     }
 
     /// Copies the picture that was just made and draws the HUD into it. Frames of a kind that the
@@ -157,7 +165,13 @@ impl WindowDisplay {
 
     fn settle(&mut self, told: Told) {
         match told {
-            Told::Presented { planned, presented_at, .. } => {
+            Told::Presented { planned, presented_at, heard_at } => {
+                trace!(
+                    planned = planned.as_ns(),
+                    at = presented_at.as_ns(),
+                    heard_at = heard_at.as_ns(),
+                    "shown"
+                );
                 let is_older = |one: &Presented| MonoTime::from_ns(one.present_at_ns) <= planned;
                 while let Some(mut presented) = self.awaited.pop_front_if(|one| is_older(one)) {
                     if presented.present_at_ns == planned.as_ns() {
@@ -167,6 +181,7 @@ impl WindowDisplay {
                 }
             }
             Told::Discarded { planned } => {
+                trace!(planned = planned.as_ns(), "discarded");
                 self.awaited.retain(|one| one.present_at_ns != planned.as_ns());
             }
             Told::Mode(_) | Told::Visible(_) => {}

@@ -18,6 +18,8 @@ const ROLE: &str = "FOREFRAME_TEST_ROLE";
 const SOCKET: &str = "FOREFRAME_TEST_SOCKET";
 const RECORD: &str = "FOREFRAME_TEST_RECORD";
 const SINK: &str = "FOREFRAME_TEST_SINK";
+/// What a daemon with windows logs.
+const LOG: &str = "info,foreframed::stream::display=trace";
 const READY: &str = "the child is ready";
 
 /// What a child does.
@@ -52,8 +54,9 @@ pub(crate) fn run_if_asked() {
         "daemon" => {
             let record = std::env::var_os(RECORD).map(Into::into);
             let sink = std::env::var(SINK).ok().map(|sink| sink.parse().unwrap());
-            let log = Some(if sink.is_some() { "info" } else { "warn" }.to_owned());
-            let args = Args { socket, record, sink, log, ..Args::default() };
+            let log = Some(if sink.is_some() { LOG } else { "warn" }.to_owned());
+            let fullscreen = sink.is_some();
+            let args = Args { socket, record, sink, log, fullscreen, ..Args::default() };
             match foreframed::run(args) {
                 Ok(()) => 0,
                 Err(error) => {

@@ -6,7 +6,8 @@
 //! leads, no lead separates them, and the deadline stays what it was. Misses widen the margin, so
 //! leads vary by themselves as long as there are misses.
 //!
-//! The deadline comes down slowly, so that a display which was busy for a while is tried again.
+//! The deadline comes down slowly, so that a display which was busy for a while is tried again. It may
+//! start from a guess: a display that is always late looks like one that is never early enough.
 
 use std::collections::VecDeque;
 
@@ -39,6 +40,11 @@ pub(super) struct Deadline {
 }
 
 impl Deadline {
+    /// Believed until the display shows otherwise.
+    pub(super) fn starting_at(before_refresh: MonoSpan) -> Self {
+        Self { before_refresh: before_refresh.max(MonoSpan::ZERO), ..Self::default() }
+    }
+
     /// Time before the refresh; zero until a display turns out to need some.
     pub(super) fn before_refresh(&self) -> MonoSpan {
         self.before_refresh
@@ -68,6 +74,13 @@ impl Deadline {
         {
             self.before_refresh = (lead + STEP).min(most);
         }
+    }
+
+    /// No frame is ever shown sooner than `needed` after it was handed over.
+    pub(super) fn move_up_to(&mut self, needed: MonoSpan, interval: MonoSpan) {
+        let most = interval.scale(MOST_PERCENT, 100);
+        self.before_refresh = (needed + STEP).min(most).max(self.before_refresh);
+        self.frames.clear();
     }
 
     /// Frames in time that met a deadline.

@@ -26,6 +26,14 @@ const OVERDUE_LIMIT: usize = 2;
 const PATIENCE: MonoSpan = MonoSpan::from_ms(100);
 /// After so many answers in a row that never came the display is one that does not answer.
 const SILENT_LIMIT: u32 = 8;
+/// A frame shown so much later after the one before than planned came after the deadline, as a share
+/// of the interval in percent. Displays without a beam show such a frame a little late, not at the
+/// next refresh, and go on from there. Timestamps of software are off by 12 % at 144 Hz.
+const LATE_PERCENT: i64 = 18;
+/// Frames that tell whether any is ever shown as soon as planned.
+const PASSAGE_WINDOW: usize = 32;
+/// They are not, if the shortest passage is longer than the usual lead by this share of the interval.
+const PASSAGE_PERCENT: i64 = 5;
 /// Frames that the lateness of a display looks back on.
 const LATENESS_WINDOW: usize = 16;
 /// A display shows everything at most so many refreshes late.
@@ -58,27 +66,49 @@ pub(super) struct Flight {
     /// Refreshes that the display needs from its deadline to showing a frame.
     offset: i64,
     deadline: Deadline,
+    /// What the deadline starts from.
+    first_deadline: MonoSpan,
+    /// The frame that was shown last: planned and presented.
+    shown: Option<(MonoTime, MonoTime)>,
+    /// From being handed over to being shown, of frames not a whole refresh late.
+    passages: Recent<PASSAGE_WINDOW>,
+    /// From being handed over to the planned refresh, of the same frames.
+    leads: Recent<PASSAGE_WINDOW>,
 }
 
 impl Flight {
+    /// On a display that is expected to need frames so long before a refresh.
+    pub(super) fn with_deadline(first_deadline: MonoSpan) -> Self {
+        let deadline = Deadline::starting_at(first_deadline);
+        Self { deadline, first_deadline, ..Self::default() }
+    }
+
     /// A frame for `planned` was handed over.
     pub(super) fn hand_over(&mut self, planned: MonoTime, lead: MonoSpan, was_in_time: bool) {
         self.waiting.push_back(Waiting { planned, lead, was_in_time });
     }
 
-    /// The frame for `planned` was shown `refreshes` after it; this was heard at `heard_at`.
+    /// The frame for `planned` was shown `late` after it; this was heard at `heard_at`.
     pub(super) fn on_shown(
         &mut self,
         planned: MonoTime,
-        refreshes: i64,
+        late: MonoSpan,
         heard_at: MonoTime,
         interval: MonoSpan,
     ) {
         let Some(Waiting { lead, was_in_time, .. }) = self.take(planned) else { return };
         // What is not about the next refresh, or was late already, tells nothing of the deadline.
         let ahead = lead - interval.scale(self.offset, 1);
+        let half = interval.scale(1, 2);
+        let refreshes = (late + half).as_ns().div_euclid(interval.as_ns().max(1));
+        let gap = self.gap_before(planned, late, interval);
+        let was_late = late.min(gap) > interval.scale(LATE_PERCENT, 100);
+        self.shown = Some((planned, planned + late));
         if (0..=1).contains(&refreshes) && ahead > MonoSpan::ZERO {
-            self.deadline.on_frame(ahead, refreshes > 0, interval);
+            self.deadline.on_frame(ahead, was_late, interval);
+        }
+        if refreshes == self.offset {
+            self.learn_passage(lead, lead + late, interval);
         }
         self.delays.push(heard_at - planned);
         if self.delays.len() >= ANSWERS_TO_LEARN {
@@ -100,7 +130,8 @@ impl Flight {
 
     /// Nothing that was learned from the display holds any more.
     pub(super) fn on_mode(&mut self) {
-        *self = Self { silent_in_a_row: self.silent_in_a_row, ..Self::default() };
+        let first = Self::with_deadline(self.first_deadline);
+        *self = Self { silent_in_a_row: self.silent_in_a_row, ..first };
     }
 
     /// Refreshes from the display's deadline to the one that shows a frame, beyond the first.
@@ -152,6 +183,36 @@ impl Flight {
         self.waiting.drain(..=position).next_back()
     }
 
+    /// By how much longer than planned the frame before was shown: when a display goes on from a late
+    /// frame, those after it are late, too, and not to blame.
+    fn gap_before(&self, planned: MonoTime, late: MonoSpan, interval: MonoSpan) -> MonoSpan {
+        let Some((before, shown)) = self.shown else { return late };
+        let half = interval.scale(1, 2);
+        let steps = (planned - before + half).as_ns().div_euclid(interval.as_ns().max(1)).max(1);
+        planned + late - shown - interval.scale(steps, 1)
+    }
+
+    /// A display that shows frames when it gets them shows all of them late if all come too late, and
+    /// seems to refresh more slowly. It gives itself away by never showing one sooner.
+    fn learn_passage(&mut self, lead: MonoSpan, passage: MonoSpan, interval: MonoSpan) {
+        self.leads.push(lead);
+        self.passages.push(passage);
+        if self.passages.len() < PASSAGE_WINDOW {
+            return;
+        }
+        let (Some(shortest), Some(usual_lead)) =
+            (self.passages.percentile(0), self.leads.percentile(50))
+        else {
+            return;
+        };
+        if shortest - usual_lead > interval.scale(PASSAGE_PERCENT, 100) {
+            let needed = shortest - interval.scale(self.offset, 1);
+            self.deadline.move_up_to(needed, interval);
+            self.passages.clear();
+            self.leads.clear();
+        }
+    }
+
     fn learn_offset(&mut self, refreshes: i64) {
         self.lateness.push_back(refreshes);
         if self.lateness.len() < LATENESS_WINDOW {
@@ -167,7 +228,9 @@ impl Flight {
         if offset != self.offset {
             self.offset = offset;
             self.lateness.clear();
-            self.deadline = Deadline::default();
+            self.deadline = Deadline::starting_at(self.first_deadline);
+            self.passages.clear();
+            self.leads.clear();
         }
     }
 
@@ -196,7 +259,8 @@ mod tests {
         let mut flight = Flight::default();
         for frame in 1..=frames {
             flight.hand_over(at(frame * 10), LEAD, true);
-            flight.on_shown(at(frame * 10), late, at((frame + late) * 10 + 1), INTERVAL);
+            let heard_at = at((frame + late) * 10 + 1);
+            flight.on_shown(at(frame * 10), INTERVAL.scale(late, 1), heard_at, INTERVAL);
             flight.verify_invariants();
         }
         flight
@@ -217,7 +281,7 @@ mod tests {
         assert_eq!(flight.hold_until(at(2_000), INTERVAL), None);
         assert!(flight.is_silent());
         flight.hand_over(at(2_010), LEAD, true);
-        flight.on_shown(at(2_010), 0, at(2_011), INTERVAL);
+        flight.on_shown(at(2_010), MonoSpan::ZERO, at(2_011), INTERVAL);
         assert!(!flight.is_silent());
     }
 
@@ -227,7 +291,7 @@ mod tests {
         for frame in 1..100 {
             flight.hand_over(at(frame * 10), LEAD, true);
             if frame > 8 {
-                flight.on_shown(at((frame - 8) * 10), 0, at(frame * 10), INTERVAL);
+                flight.on_shown(at((frame - 8) * 10), MonoSpan::ZERO, at(frame * 10), INTERVAL);
             }
             assert_eq!(flight.hold_until(at(frame * 10), INTERVAL), None, "frame {frame}");
         }
@@ -240,7 +304,7 @@ mod tests {
         (11..15).for_each(|frame| flight.hand_over(at(frame * 10), LEAD, true));
         flight.on_discarded(at(777), INTERVAL, true);
         assert_eq!(flight.unanswered(), 4);
-        flight.on_shown(at(130), 0, at(131), INTERVAL);
+        flight.on_shown(at(130), MonoSpan::ZERO, at(131), INTERVAL);
         assert_eq!(flight.unanswered(), 1);
     }
 
@@ -253,7 +317,7 @@ mod tests {
             flight.hand_over(at(frame * 10), LEAD, true);
             flight.on_shown(
                 at(frame * 10),
-                i64::from(frame % 5 == 0),
+                INTERVAL.scale(i64::from(frame % 5 == 0), 1),
                 at(frame * 10 + 1),
                 INTERVAL,
             );
@@ -261,9 +325,57 @@ mod tests {
         assert_eq!(flight.offset(), 1, "a miss now and then is none");
         for frame in 200..220 {
             flight.hand_over(at(frame * 10), LEAD, true);
-            flight.on_shown(at(frame * 10), -1, at(frame * 10 + 1), INTERVAL);
+            flight.on_shown(at(frame * 10), INTERVAL.scale(-1, 1), at(frame * 10 + 1), INTERVAL);
         }
         assert_eq!(flight.offset(), 0);
+    }
+
+    /// Shows each frame when it gets it, but not sooner than `passage` later or one interval after the
+    /// frame before. Frames are planned one interval after the frame that was shown last.
+    fn shown_when_it_comes(
+        flight: &mut Flight,
+        passage: MonoSpan,
+        lead: impl Fn(i64, &Flight) -> MonoSpan,
+    ) {
+        let mut shown = at(0);
+        for frame in 1..400 {
+            let planned = shown + INTERVAL;
+            let lead = lead(frame, flight);
+            flight.hand_over(planned, lead, true);
+            shown = planned.max(planned - lead + passage);
+            flight.on_shown(planned, shown - planned, shown, INTERVAL);
+        }
+    }
+
+    #[test]
+    fn frames_shown_a_little_late_give_the_deadline_away() {
+        let mut flight = Flight::default();
+        let leads = |frame, _: &Flight| MonoSpan::from_us(1_000 + (frame * 37) % 50 * 100);
+        shown_when_it_comes(&mut flight, MonoSpan::from_ms(4), leads);
+        let range = MonoSpan::from_us(1_700)..MonoSpan::from_us(4_600);
+        assert!(range.contains(&flight.deadline()), "{:?}", flight.deadline());
+    }
+
+    #[test]
+    fn frames_that_all_come_too_late_for_a_display_that_follows_move_up() {
+        let mut flight = Flight::default();
+        let lead = |_, flight: &Flight| flight.deadline() + MonoSpan::from_us(500);
+        shown_when_it_comes(&mut flight, MonoSpan::from_ms(4), lead);
+        let range = MonoSpan::from_us(3_500)..MonoSpan::from_us(5_000);
+        assert!(range.contains(&flight.deadline()), "{:?}", flight.deadline());
+    }
+
+    #[test]
+    fn an_expected_deadline_comes_back_when_all_that_was_learned_is_forgotten() {
+        let mut flight = Flight::with_deadline(MonoSpan::from_ms(4));
+        assert_eq!(flight.deadline(), MonoSpan::from_ms(4));
+        for frame in 1..2_000 {
+            flight.hand_over(at(frame * 10), MonoSpan::from_ms(5), true);
+            flight.on_shown(at(frame * 10), MonoSpan::ZERO, at(frame * 10 + 1), INTERVAL);
+        }
+        assert!(flight.deadline() < MonoSpan::from_us(3_500), "{:?}", flight.deadline());
+        flight.on_mode();
+        assert_eq!(flight.deadline(), MonoSpan::from_ms(4));
     }
 
     #[test]
@@ -271,7 +383,7 @@ mod tests {
         let mut flight = Flight::default();
         for frame in 1..100 {
             flight.hand_over(at(frame * 10), LEAD, false);
-            flight.on_shown(at(frame * 10), 1, at(frame * 10 + 11), INTERVAL);
+            flight.on_shown(at(frame * 10), INTERVAL, at(frame * 10 + 11), INTERVAL);
         }
         assert_eq!(flight.offset(), 0);
     }

@@ -21,6 +21,13 @@ const SLACK_SMOOTHING_DIVISOR: i64 = 8;
 const TARGET_SLACK: MonoSpan = MonoSpan::from_us(500);
 /// Deadline and margin together are at most this share of a refresh interval, in percent.
 const EARLIEST_PERCENT: i64 = 85;
+/// A frame shown earlier than planned by more than this share of the interval, in percent, has not
+/// waited for a refresh.
+const EARLY_PERCENT: i64 = 30;
+/// So many of them in a row mean that the display follows us at a pace slower than its own.
+const EARLY_TO_REPHASE: u32 = 4;
+/// A picture that is ready sooner is handed over this share of an interval before it has to be.
+const EARLY_DIVISOR: i64 = 8;
 /// So many frames in a row that the display throws away mean that nobody sees them.
 const DISCARDS_TO_HIDE: u32 = 16;
 /// So many of them in a row are no fault of the pacing, and widen no margin.
@@ -48,10 +55,13 @@ pub struct Pacer {
     budget: Budget,
     newest: Option<MonoTime>,
     last_target: Option<MonoTime>,
+    /// When the frame for `last_target` was shown, once that is known.
+    last_shown: Option<MonoTime>,
     last_content: Option<MonoTime>,
     /// Whether the window is shown, as far as its owner knows.
     is_visible: bool,
     discards_in_a_row: u32,
+    early_in_a_row: u32,
     /// What the frame that was started last shows.
     in_work: Shows,
     slack: Option<MonoSpan>,
@@ -77,13 +87,22 @@ impl Pacer {
             budget: Budget::new(config.work),
             newest: None,
             last_target: None,
+            last_shown: None,
             last_content: None,
             is_visible: true,
             discards_in_a_row: 0,
+            early_in_a_row: 0,
             in_work: Shows::InBetween,
             slack: None,
             counts: PacerCounts::default(),
         }
+    }
+
+    /// The same, on a display that is expected to need frames `before_refresh`, until it shows
+    /// otherwise. Without this a frame is expected to be shown if it comes just before.
+    #[must_use]
+    pub fn with_deadline(self, before_refresh: MonoSpan) -> Self {
+        Self { flight: Flight::with_deadline(before_refresh), ..self }
     }
 
     /// A key frame has arrived, whole. `is_cut`: nothing before it relates to it.
@@ -134,7 +153,8 @@ impl Pacer {
         let submit_by = (deadline - hand_over).max(now);
         let wake_at = (present_at - self.budget_of(shows)).max(now);
         let submit_from = match (&self.variable, shows) {
-            (None, _) if self.knows_phase() => deadline - interval + hand_over + hand_over,
+            // A display without a beam shows what comes early early.
+            (None, _) if self.knows_phase() => submit_by - interval.scale(1, EARLY_DIVISOR),
             (Some(_), Shows::Key) => now,
             (None, _) | (Some(_), Shows::InBetween) => submit_by,
         };
@@ -168,6 +188,7 @@ impl Pacer {
             return; // the same plan again: its refresh is taken already
         }
         self.last_target = Some(plan.present_at);
+        self.last_shown = None;
         if let Some(variable) = &mut self.variable {
             variable.on_start(plan.present_at);
         }
@@ -232,17 +253,25 @@ impl Pacer {
             }
         }
         self.discards_in_a_row = 0;
+        if self.last_target == Some(planned) {
+            self.last_shown = Some(presented_at);
+        }
         let interval = self.interval();
         let half = interval.scale(1, 2);
         let late = presented_at - planned;
-        if self.variable.is_none() {
-            let refreshes = (late + half).as_ns().div_euclid(interval.as_ns().max(1));
-            self.flight.on_shown(planned, refreshes, heard_at, interval);
-        } else {
-            self.flight.on_shown(planned, 0, heard_at, interval);
+        let is_early = late < -interval.scale(EARLY_PERCENT, 100);
+        self.early_in_a_row = if is_early { self.early_in_a_row + 1 } else { 0 };
+        if self.early_in_a_row >= EARLY_TO_REPHASE && self.variable.is_none() {
+            self.early_in_a_row = 0;
+            self.refresh.restart_at(presented_at);
         }
-        if late > half || late < -half {
+        let late_for_grid = if self.variable.is_none() { late } else { MonoSpan::ZERO };
+        self.flight.on_shown(planned, late_for_grid, heard_at, interval);
+        if late > half {
             self.on_miss();
+        } else if late < -half {
+            // Shown early: a wider margin would make it earlier still.
+            self.counts.missed += 1;
         } else {
             self.counts.on_target += 1;
             self.budget.on_good();
@@ -365,7 +394,11 @@ impl Pacer {
         }
         let half = self.refresh.interval().scale(1, 2);
         // Half an interval tells the next refresh from the taken one after the grid has moved.
-        let free = self.last_target.map_or(MonoTime::ZERO, |taken| taken + half);
+        let free = self.last_target.map_or(MonoTime::ZERO, |planned| match self.last_shown {
+            // Shown early, it has not taken the refresh that it was planned for.
+            Some(shown) if shown < planned => (shown + half).max(planned + half.scale(1, 4)),
+            _ => planned + half,
+        });
         self.refresh.at_or_after(ready.max(free))
     }
 

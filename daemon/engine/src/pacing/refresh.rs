@@ -162,6 +162,13 @@ impl RefreshTracker {
             .clamp(self.announced - bound, self.announced + bound);
     }
 
+    /// The grid was no display's, but what came back of our own pace: it begins anew at `time`, and is
+    /// not slower than announced.
+    pub(super) fn restart_at(&mut self, time: MonoTime) {
+        self.interval = self.interval.min(self.announced);
+        self.begin_at(fixed(time));
+    }
+
     /// The grid begins anew at `time`, with the interval as it is.
     fn begin_at(&mut self, time: i128) {
         self.anchor = Some(time);

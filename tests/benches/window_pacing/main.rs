@@ -1,0 +1,132 @@
+//! The daemon's windows on real compositors: how often a frame is shown when it was planned, how even
+//! the frames are, and how long they take, beside a plain client that draws whenever it is asked to.
+//!
+//! `cargo bench -p foreframe-tests --bench window_pacing [-- SECONDS [COMPOSITOR[:HZ]...]]`. The
+//! application runs at 40 keys a second, 640x360, full screen; the first second is not counted.
+//! `FOREFRAME_KEEP_LOG=FILE` keeps the log of the last daemon.
+
+#[path = "../../tests/compositors/mod.rs"]
+mod compositors;
+#[path = "../../tests/daemon_fixture/mod.rs"]
+mod daemon_fixture;
+mod fifo;
+mod record;
+
+use compositors::{Compositor, Kind};
+use daemon_fixture::child::{ChildProcess, run_if_asked};
+use daemon_fixture::{Client, KeySource, private_folder};
+use foreframe_engine::MonoSpan;
+use foreframe_protocol::{
+    CameraMotion, DaemonMessage, MotionConvention, MotionDirection, MotionFormat, MotionUnit,
+    PlaneKind, Presented, StreamFormat, Submit,
+};
+use foreframed::clock;
+use record::{Record, Row};
+
+const SIZE: [u32; 2] = [640, 360];
+const KEYS_PER_S: i64 = 40;
+const DEFAULT: [&str; 5] = ["mutter:60", "mutter:120", "mutter:144", "weston:60", "sway:120"];
+
+fn main() {
+    run_if_asked();
+    let mut words = std::env::args().skip(1).filter(|word| !word.starts_with("--"));
+    let seconds = words.next().map_or(10, |word| word.parse().expect("a number of seconds"));
+    let asked: Vec<String> = words.collect();
+    let asked = if asked.is_empty() { DEFAULT.map(str::to_owned).into() } else { asked };
+    println!("{}", Row::HEAD);
+    for name in asked {
+        let (program, hz) = name.split_once(':').unwrap_or((&name, "60"));
+        let kinds = [Kind::Mutter, Kind::Weston, Kind::Sway];
+        let kind = kinds.into_iter().find(|kind| kind.program() == program);
+        let kind = kind.expect("mutter, weston or sway");
+        let hz = hz.parse().expect("a rate in Hz");
+        let Some(compositor) = Compositor::start(kind, SIZE, hz) else { continue };
+        // Clients of the first second are not shown by some.
+        clock::sleep_until(clock::now() + MonoSpan::from_ms(2_000));
+        let socket = compositor.folder().join(
+            compositor
+                .environment
+                .iter()
+                .find(|(name, _)| *name == "WAYLAND_DISPLAY")
+                .map_or("", |(_, at)| at),
+        );
+        let interval = MonoSpan::from_hz(f64::from(hz));
+        println!("{}", fifo::run(&socket, SIZE, seconds).row(&format!("{name} plain"), interval));
+        let (record, keys) = through_the_daemon(&compositor, seconds);
+        println!(
+            "{}{}",
+            record.row(&format!("{name} foreframe"), interval),
+            late_keys(&keys, interval)
+        );
+    }
+}
+
+fn through_the_daemon(compositor: &Compositor, seconds: i64) -> (Record, Vec<Presented>) {
+    let folder = private_folder();
+    let [socket, log] = ["daemon.sock", "log"].map(|name| folder.path().join(name));
+    let daemon = ChildProcess::daemon_with_windows(&socket, &compositor.environment, &log);
+    let mut client = Client::connect(&socket);
+    let [width, height] = SIZE;
+    let format = StreamFormat {
+        motion: Some(MotionConvention {
+            format: MotionFormat::Rg16f,
+            direction: MotionDirection::CurrentToPrevious,
+            unit: MotionUnit::Pixels,
+            scale: [1.0; 2],
+            camera_motion: CameraMotion::Included,
+        }),
+        ..StreamFormat::rgba8(width, height)
+    };
+    let mut source = client.open_stream_sized(1, format, 2);
+    fill_motion(&mut source);
+    let interval = MonoSpan::from_ns(1_000_000_000 / KEYS_PER_S);
+    let (mut keys, mut before) = (Vec::new(), None::<Submit>);
+    let mut due_at = clock::now();
+    for key in 0..seconds * KEYS_PER_S {
+        clock::sleep_until(due_at);
+        due_at += interval;
+        let grey = u8::try_from(key % 256).expect("a byte");
+        let mut submit = source.fill([grey, 120, 160, 255]);
+        submit.motion_from_ns = before.map(|before| before.content_time_ns);
+        client.send(submit);
+        client.expect_released(&submit);
+        before = Some(submit);
+        keys.extend(client.take_waiting().into_iter().filter_map(|message| match message {
+            DaemonMessage::Presented(presented) if key > KEYS_PER_S => Some(presented),
+            _ => None,
+        }));
+    }
+    drop(daemon);
+    if let Some(kept) = std::env::var_os("FOREFRAME_KEEP_LOG") {
+        std::fs::copy(&log, kept).expect("the place that FOREFRAME_KEEP_LOG names can be written");
+    }
+    (Record::of_log(&log), keys)
+}
+
+/// How many keys were shown more than so many refreshes after they came.
+fn late_keys(keys: &[Presented], interval: MonoSpan) -> String {
+    let refreshes = |key: &Presented| {
+        (key.presented_at_ns.saturating_sub(key.received_at_ns)) as f64 / interval.as_ns() as f64
+    };
+    let mut all: Vec<f64> = keys.iter().map(refreshes).collect();
+    all.sort_by(f64::total_cmp);
+    let at = |percent: usize| all.get((all.len().max(1) - 1) * percent / 100).copied();
+    let [median, p99, most] = [50, 99, 100].map(|percent| at(percent).unwrap_or(f64::NAN));
+    format!(
+        "  keys: {median:.2} / {p99:.2} / {most:.2} refreshes from received to shown, of {}",
+        keys.len()
+    )
+}
+
+/// Everything moves 4 pixels to the left from key to key.
+fn fill_motion(source: &mut KeySource) {
+    const HALF_OF_4: [u8; 2] = 0x4400_u16.to_le_bytes();
+    let submit = source.layout();
+    let plane = submit.get(PlaneKind::Motion).expect("the format has motion");
+    let (start, len) = (plane.offset as usize, plane.byte_len(4) as usize);
+    for slot in &mut source.slots {
+        for pixel in slot[start..start + len].chunks_exact_mut(4) {
+            pixel[..2].copy_from_slice(&HALF_OF_4);
+        }
+    }
+}
