@@ -78,7 +78,9 @@ fn a_good_compositor_is_not_called_anything_else() {
     let shown = stage.show_until(|shown, _| shown.len() > 60);
     assert!(shown.iter().any(|it| it.presented_at_ns != it.present_at_ns), "{shown:?}");
     stage.strike();
-    assert!(!stage.log().contains("WARN"), "{}", stage.log());
+    let log = stage.log();
+    assert!(!log.contains("another pacing") && !log.contains("rate is measured"), "{log}");
+    assert!(!log.contains("make no sense") && !log.contains("kept all buffers"), "{log}");
 }
 
 #[test]
@@ -124,9 +126,8 @@ fn a_refresh_rate_that_is_a_lie_is_found_out() {
 fn buffers_that_never_come_back_stall_nobody() {
     let mut stage = Stage::set(Script { releases: false, ..Script::GOOD });
     stage.show_until(|_, log| log.matches("is_taken=false").count() > 20);
-    let before = clock::now();
+    // Returns when the slot has come back.
     stage.client.submit(&mut stage.source, [1, 2, 3, 255]);
-    assert!(clock::now() >= before, "the slot came back, or the client's patience had ended");
     stage.strike();
     assert!(stage.log().contains("kept all buffers"), "{}", stage.log());
 }
