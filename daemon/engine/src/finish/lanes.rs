@@ -3,15 +3,21 @@
 //! A pixel of four bytes becomes one word with 16 bits for each channel: 64 of its largest values
 //! and a rounding still fit, at 8 and at 10 bits. Halves take 32 bits a channel.
 
+#[cfg(target_arch = "x86_64")]
+pub(super) mod avx2;
+
 use std::cell::RefCell;
-use std::ops::{Add, Shl};
+use std::ops::Add;
 
 use crate::color::{OrderedRgba16, Rgb10a2, Rgba8, Texel};
+#[cfg(target_arch = "x86_64")]
+use crate::simd::has_avx2;
 
 /// A sum of the channels of up to 64 pixels.
-pub(super) trait Lanes:
-    Copy + Default + Send + Sync + Add<Output = Self> + Shl<u32, Output = Self>
-{
+pub(super) trait Lanes: Copy + Default + Send + Sync + Add<Output = Self> {
+    /// Each channel so many times.
+    fn times(self, weight: u32) -> Self;
+
     /// Each channel plus half, shifted down, which leaves a channel of one pixel. Bits above that
     /// are not defined; [`Wide::narrow`] passes over them.
     fn rounded(self, shift: u32) -> Self;
@@ -46,6 +52,60 @@ pub(super) trait Wide: Texel {
     /// Red, green, blue, alpha.
     fn channels(self) -> [u16; 4];
     fn of_channels(channels: [u16; 4]) -> Self;
+
+    /// Of each column, the pixels of three rows weighed and added up.
+    #[inline(always)]
+    fn weigh(rows: [&[Self]; 3], weights: [u32; 3], sums: &mut [Self::Lanes]) {
+        weigh_from(0, rows, weights, sums);
+    }
+
+    /// Every second column with its neighbours: 1 2 1 of `sums[2 i..]`, of which 16 make a pixel.
+    #[inline(always)]
+    fn halve(sums: &[Self::Lanes], row: &mut [Self]) {
+        halve_from(0, sums, row);
+    }
+
+    /// Twice as many columns: 1 6 1 of `sums[i..]` and 4 4 of `sums[i + 1..]` in turn, of which 64
+    /// make a pixel.
+    #[inline(always)]
+    fn expand(sums: &[Self::Lanes], row: &mut [Self]) {
+        expand_from(0, sums, row);
+    }
+}
+
+#[inline(always)]
+fn weigh_from<T: Wide>(done: usize, rows: [&[T]; 3], weights: [u32; 3], sums: &mut [T::Lanes]) {
+    for (column, sum) in sums.iter_mut().enumerate().skip(done) {
+        let [above, here, below] = rows.map(|row| row[column].widen());
+        *sum = above.times(weights[0]) + here.times(weights[1]) + below.times(weights[2]);
+    }
+}
+
+#[inline(always)]
+fn halve_from<T: Wide>(done: usize, sums: &[T::Lanes], row: &mut [T]) {
+    for (column, texel) in row.iter_mut().enumerate().skip(done) {
+        let [before, here, after] = [0, 1, 2].map(|tap| sums[2 * column + tap]);
+        *texel = T::narrow((before + here.times(2) + after).rounded(4));
+    }
+}
+
+#[inline(always)]
+fn expand_from<T: Wide>(done: usize, sums: &[T::Lanes], row: &mut [T]) {
+    for (column, texel) in row.iter_mut().enumerate().skip(done) {
+        *texel = expanded(sums, column);
+    }
+}
+
+/// What [`Wide::expand`] makes of one column.
+#[inline(always)]
+pub(super) fn expanded<T: Wide>(sums: &[T::Lanes], column: usize) -> T {
+    let [before, here, after] = [0, 1, 2].map(|tap| sums[column / 2 + tap]);
+    let sum = if column.is_multiple_of(2) {
+        before + here.times(6) + after
+    } else {
+        here.times(4) + after.times(4)
+    };
+    T::narrow(sum.rounded(6))
 }
 
 /// Four channels of 16 bits, red lowest.
@@ -65,16 +125,12 @@ impl Add for Packed {
     }
 }
 
-impl Shl<u32> for Packed {
-    type Output = Self;
-
-    #[inline(always)]
-    fn shl(self, shift: u32) -> Self {
-        Self(self.0 << shift)
-    }
-}
-
 impl Lanes for Packed {
+    #[inline(always)]
+    fn times(self, weight: u32) -> Self {
+        Self(self.0.wrapping_mul(weight.into()))
+    }
+
     #[inline(always)]
     fn rounded(self, shift: u32) -> Self {
         Self(self.0.wrapping_add(ONES << (shift - 1)) >> shift)
@@ -110,6 +166,39 @@ impl Wide for Rgba8 {
     fn of_channels(channels: [u16; 4]) -> Self {
         let [r, g, b, a] = channels.map(u32::from);
         Self(r | g << 8 | b << 16 | a << 24)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    fn weigh(rows: [&[Self]; 3], weights: [u32; 3], sums: &mut [Packed]) {
+        let mut done = 0;
+        if has_avx2() {
+            // SAFETY: the processor has AVX2, asked for just above.
+            done = unsafe { avx2::weigh(rows, weights, sums) };
+        }
+        weigh_from(done, rows, weights, sums);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    fn halve(sums: &[Packed], row: &mut [Self]) {
+        let mut done = 0;
+        if has_avx2() {
+            // SAFETY: the processor has AVX2, asked for just above.
+            done = unsafe { avx2::halve(sums, row) };
+        }
+        halve_from(done, sums, row);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    fn expand(sums: &[Packed], row: &mut [Self]) {
+        let mut done = 0;
+        if has_avx2() {
+            // SAFETY: the processor has AVX2, asked for just above.
+            done = unsafe { avx2::expand(sums, row) };
+        }
+        expand_from(done, sums, row);
     }
 }
 
@@ -153,16 +242,12 @@ impl Add for Quad {
     }
 }
 
-impl Shl<u32> for Quad {
-    type Output = Self;
-
-    #[inline(always)]
-    fn shl(self, shift: u32) -> Self {
-        Self(self.0.map(|channel| channel << shift))
-    }
-}
-
 impl Lanes for Quad {
+    #[inline(always)]
+    fn times(self, weight: u32) -> Self {
+        Self(self.0.map(|channel| channel.wrapping_mul(weight)))
+    }
+
     #[inline(always)]
     fn rounded(self, shift: u32) -> Self {
         Self(self.0.map(|channel| (channel + (1 << (shift - 1))) >> shift))
@@ -203,7 +288,7 @@ mod tests {
     fn is_kept<T: Wide + std::fmt::Debug>(texel: T) {
         assert_eq!(T::narrow(texel.widen()), texel);
         assert_eq!(T::of_channels(texel.channels()), texel);
-        let sum = (texel.widen() << 5) + (texel.widen() << 5);
+        let sum = texel.widen().times(32) + texel.widen().times(32);
         assert_eq!(T::narrow(sum.rounded(6)), texel, "64 of one pixel are that pixel");
     }
 

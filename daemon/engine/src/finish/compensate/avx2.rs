@@ -1,22 +1,20 @@
 //! Eight `rgba8` pixels at a time.
 //!
-//! The blur of a row comes from sums of 16 bits, four pixels of the coarse level in a register. Of
-//! in-between frames most pixels lie within the room of their sixteenth, where (2) of [`super`] is
+//! Of in-between frames most pixels lie within the room of their sixteenth, where (2) of [`super`] is
 //! the blur itself; where one of eight does not, and for keys where a pixel differs from its blur,
 //! the tables are looked up. The caller asks the processor whether it has AVX2.
 
 use std::arch::x86_64::{
-    __m256i, _mm256_add_epi16, _mm256_and_si256, _mm256_andnot_si256, _mm256_cmpeq_epi32,
-    _mm256_i32gather_epi32, _mm256_loadu_si256, _mm256_max_epu8, _mm256_min_epu8,
-    _mm256_movemask_epi8, _mm256_or_si256, _mm256_packus_epi16, _mm256_set1_epi8,
-    _mm256_set1_epi16, _mm256_set1_epi32, _mm256_setr_epi8, _mm256_shuffle_epi8, _mm256_slli_epi16,
-    _mm256_slli_epi32, _mm256_srli_epi16, _mm256_srli_epi32, _mm256_storeu_si256, _mm256_subs_epu8,
-    _mm256_testz_si256, _mm256_unpackhi_epi64, _mm256_unpacklo_epi64,
+    __m256i, _mm256_and_si256, _mm256_andnot_si256, _mm256_cmpeq_epi32, _mm256_i32gather_epi32,
+    _mm256_loadu_si256, _mm256_max_epu8, _mm256_min_epu8, _mm256_movemask_epi8, _mm256_or_si256,
+    _mm256_set1_epi8, _mm256_set1_epi32, _mm256_setr_epi8, _mm256_shuffle_epi8, _mm256_slli_epi32,
+    _mm256_srli_epi16, _mm256_srli_epi32, _mm256_storeu_si256, _mm256_subs_epu8,
+    _mm256_testz_si256,
 };
 
 use crate::color::Rgba8;
 use crate::finish::lanes::Wide;
-use crate::finish::pyramid::Expanded;
+use crate::finish::lanes::avx2::expanded;
 use crate::finish::shares::ByteTables;
 
 /// Pixels of one step.
@@ -27,47 +25,21 @@ const LANES: usize = 8;
 pub(super) fn row(
     tables: &ByteTables,
     is_key: bool,
-    blurred: &Expanded<'_, <Rgba8 as Wide>::Lanes>,
+    sums: &[<Rgba8 as Wide>::Lanes],
     row: &mut [Rgba8],
 ) -> usize {
     let count = row.len() / LANES;
-    // A step reads six columns of the coarse level from the fourth part of it on.
-    assert!(blurred.sums.len() >= 4 * count + 2, "a coarse level covers the fine one");
     let room = Room::new(tables);
     for (step, texels) in row.chunks_exact_mut(LANES).enumerate() {
         // SAFETY: there are 8 pixels of 4 bytes, and the load needs no alignment.
         let original = unsafe { _mm256_loadu_si256(texels.as_ptr().cast()) };
-        // SAFETY: sums 4 * step to 4 * step + 5 are there, asserted above.
-        let blur = unsafe { blur(blurred.sums.as_ptr().add(4 * step).cast()) };
+        let blur = expanded(sums, LANES / 2 * step);
         let made =
             if is_key { key(tables, original, blur) } else { room.between(tables, original, blur) };
         // SAFETY: there are 8 pixels of 4 bytes, and the store needs no alignment.
         unsafe { _mm256_storeu_si256(texels.as_mut_ptr().cast(), made) };
     }
     count * LANES
-}
-
-/// The blur of eight pixels.
-///
-/// # Safety
-/// Six words can be read from `sums` on.
-#[inline]
-#[target_feature(enable = "avx2")]
-unsafe fn blur(sums: *const u64) -> __m256i {
-    // SAFETY: by the contract, the words 0 to 5 can be read, and loads need no alignment.
-    let [before, here, after] =
-        unsafe { [sums, sums.add(1), sums.add(2)].map(|sums| _mm256_loadu_si256(sums.cast())) };
-    let half = _mm256_set1_epi16(32);
-    let here_4 = _mm256_slli_epi16(here, 2);
-    let here_6 = _mm256_add_epi16(here_4, _mm256_slli_epi16(here, 1));
-    let even = _mm256_add_epi16(_mm256_add_epi16(before, here_6), after);
-    let odd = _mm256_add_epi16(here_4, _mm256_slli_epi16(after, 2));
-    let even = _mm256_srli_epi16(_mm256_add_epi16(even, half), 6);
-    let odd = _mm256_srli_epi16(_mm256_add_epi16(odd, half), 6);
-    // Pixels 0 1 | 4 5 and 2 3 | 6 7 become 0 1 2 3 | 4 5 6 7.
-    let low = _mm256_unpacklo_epi64(even, odd);
-    let high = _mm256_unpackhi_epi64(even, odd);
-    _mm256_packus_epi16(low, high)
 }
 
 /// How far the blur may lie from the original before a table has to be asked.

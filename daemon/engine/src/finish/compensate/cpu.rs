@@ -6,8 +6,8 @@ use rayon::ThreadPool;
 use super::avx2;
 use crate::bands::for_each_row;
 use crate::color::{ColorPlane, Rgba8};
-use crate::finish::lanes::Wide;
-use crate::finish::pyramid::{Expanded, Pyramid, up_rows};
+use crate::finish::lanes::{Wide, expanded};
+use crate::finish::pyramid::{Pyramid, up_row};
 use crate::finish::shares::{ByteTables, Split};
 use crate::plane::{Plane, Rect};
 #[cfg(target_arch = "x86_64")]
@@ -51,20 +51,19 @@ fn bytes(
         picture,
         #[inline(always)]
         |y, row| {
-            up_rows(
+            up_row(
                 smooth,
                 y,
                 #[inline(always)]
-                |blurred: Expanded<'_, <Rgba8 as Wide>::Lanes>| {
+                |sums| {
                     let mut done = 0;
                     #[cfg(target_arch = "x86_64")]
                     if has_avx2() {
                         // SAFETY: the processor has AVX2, asked for just above.
-                        done = unsafe { avx2::row(tables, split.is_key, &blurred, row) };
+                        done = unsafe { avx2::row(tables, split.is_key, sums, row) };
                     }
                     for (x, texel) in row.iter_mut().enumerate().skip(done) {
-                        let blurred = Rgba8::narrow(blurred.at(x));
-                        *texel = tables.of(split.is_key, *texel, blurred);
+                        *texel = tables.of(split.is_key, *texel, expanded(sums, x));
                     }
                 },
             );
@@ -85,14 +84,13 @@ fn channels<T: Wide>(
         picture,
         #[inline(always)]
         |y, row| {
-            up_rows(
+            up_row(
                 smooth,
                 y,
                 #[inline(always)]
-                |blurred: Expanded<'_, T::Lanes>| {
+                |sums| {
                     for (x, texel) in row.iter_mut().enumerate() {
-                        let blurred = T::narrow(blurred.at(x));
-                        *texel = split.of(*texel, blurred);
+                        *texel = split.of(*texel, expanded(sums, x));
                     }
                 },
             );

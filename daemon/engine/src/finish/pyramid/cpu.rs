@@ -1,5 +1,7 @@
 //! The reference of [`super`].
 
+use std::ops::Range;
+
 use rayon::ThreadPool;
 
 use super::Pyramid;
@@ -54,16 +56,11 @@ fn build<T: Wide>(
         smooth,
         #[inline(always)]
         |y, row| {
-            let width = row.len();
-            up_rows(
+            up_row(
                 quarter,
                 y,
                 #[inline(always)]
-                |coarse: Expanded<'_, T::Lanes>| {
-                    for (x, texel) in row.iter_mut().enumerate().take(width) {
-                        *texel = T::narrow(coarse.at(x));
-                    }
-                },
+                |sums| T::expand(sums, row),
             );
         },
     );
@@ -84,83 +81,55 @@ fn down<T: Wide>(pool: &ThreadPool, fine: &Plane<T>, valid: Rect, coarse: &mut P
             T::Lanes::with_row(
                 #[inline(always)]
                 |sums: &mut Vec<T::Lanes>| {
-                    sums.clear();
-                    sums.extend(above.iter().zip(here).zip(below).map(
-                        #[inline(always)]
-                        |((above, here), below)| {
-                            above.widen() + (here.widen() << 1) + below.widen()
-                        },
-                    ));
-                    // Beside each border its pixel again.
-                    let last = sums[width - 1];
-                    sums.push(last);
-                    let first = sums[0];
-                    let (sums, mut before) = (sums.as_slice(), first);
-                    for (texel, pair) in row.iter_mut().zip(sums.chunks_exact(2)) {
-                        *texel = T::narrow((before + (pair[0] << 1) + pair[1]).rounded(4));
-                        before = pair[1];
-                    }
+                    let columns = with_borders(sums, width);
+                    T::weigh([above, here, below], [1, 2, 1], &mut sums[columns]);
+                    repeat_borders(sums, width);
+                    T::halve(sums, row);
                 },
             );
         },
     );
 }
 
-/// Row `y` of the finer level, seen from above.
-pub(in crate::finish) struct Expanded<'a, L> {
-    /// Of each column of the coarse level, 8 times what the finer row shows there; beside each
-    /// border its column again.
-    pub(in crate::finish) sums: &'a [L],
-}
-
-impl<L: Lanes> Expanded<'_, L> {
-    /// (3) in column `x`.
-    #[inline(always)]
-    pub(in crate::finish) fn at(&self, x: usize) -> L {
-        let [before, here, after] = [0, 1, 2].map(|tap| self.sums[x / 2 + tap]);
-        let sum = if x.is_multiple_of(2) {
-            before + (here << 2) + (here << 1) + after
-        } else {
-            (here << 2) + (after << 2)
-        };
-        sum.rounded(6)
-    }
-}
-
-/// Calls `read` with row `y` of what is a level finer than `coarse`.
+/// Sums of a row of `width` columns, one more before it and [`BEHIND`] more behind it. Returns where
+/// the columns are.
 #[inline(always)]
-pub(in crate::finish) fn up_rows<T: Wide>(
+fn with_borders<L: Lanes>(sums: &mut Vec<L>, width: usize) -> Range<usize> {
+    sums.resize(1 + width + BEHIND, L::default());
+    1..1 + width
+}
+
+/// Sums behind a row: its last column again, and one that is read and not used.
+const BEHIND: usize = 2;
+
+/// Gives the columns beside a row the sums of those at its borders.
+#[inline(always)]
+fn repeat_borders<L: Copy>(sums: &mut [L], width: usize) {
+    sums[0] = sums[1];
+    sums[width + 1] = sums[width];
+}
+
+/// Calls `read` with the sums of row `y` of what is a level finer than `coarse`, for
+/// [`Wide::expand`].
+#[inline(always)]
+pub(in crate::finish) fn up_row<T: Wide>(
     coarse: &Plane<T>,
     y: u32,
-    read: impl FnOnce(Expanded<'_, T::Lanes>),
+    read: impl FnOnce(&[T::Lanes]),
 ) {
     let (middle, last) = (y / 2, coarse.height() - 1);
-    let here = coarse.row(middle);
-    let below = coarse.row((middle + 1).min(last));
+    let above = coarse.row(middle.saturating_sub(1));
+    let rows = [above, coarse.row(middle), coarse.row((middle + 1).min(last))];
+    // (3)
+    let weights = if y.is_multiple_of(2) { [1, 6, 1] } else { [0, 4, 4] };
     T::Lanes::with_row(
         #[inline(always)]
         |sums: &mut Vec<T::Lanes>| {
-            sums.clear();
-            sums.push(T::Lanes::default());
-            if y.is_multiple_of(2) {
-                let above = coarse.row(middle.saturating_sub(1));
-                sums.extend(above.iter().zip(here).zip(below).map(
-                    #[inline(always)]
-                    |((above, here), below)| {
-                        let here = here.widen();
-                        above.widen() + (here << 2) + (here << 1) + below.widen()
-                    },
-                ));
-            } else {
-                sums.extend(here.iter().zip(below).map(
-                    #[inline(always)]
-                    |(here, below)| (here.widen() << 2) + (below.widen() << 2),
-                ));
-            }
-            sums[0] = sums[1];
-            let last = sums[sums.len() - 1];
-            sums.push(last);
-            read(Expanded { sums });
+            let width = coarse.width() as usize;
+            let columns = with_borders(sums, width);
+            T::weigh(rows, weights, &mut sums[columns]);
+            repeat_borders(sums, width);
+            read(sums);
         },
     );
 }

@@ -21,7 +21,7 @@ mod cpu;
 mod gpu;
 
 pub use cpu::pyramid;
-pub(super) use cpu::{Expanded, up_rows};
+pub(super) use cpu::up_row;
 pub use gpu::PYRAMID;
 
 use crate::color::ColorPlane;
