@@ -13,18 +13,18 @@ const RED: [u8; 4] = [255, 0, 0, 255];
 const GREEN: [u8; 4] = [0, 255, 0, 255];
 
 fn controller(daemon: &RunningDaemon) -> Controller {
-    Controller::connect(&daemon.socket).unwrap()
+    Controller::connect(&daemon.socket).expect("the daemon listens")
 }
 
 fn status(controller: &mut Controller) -> DaemonStatus {
-    match controller.ask(&Request::Status).unwrap() {
+    match controller.ask(&Request::Status).expect("the daemon answers") {
         Response::Status(status) => *status,
         other => panic!("{other:?}"),
     }
 }
 
 fn done(controller: &mut Controller, request: &Request) -> Vec<String> {
-    match controller.ask(request).unwrap() {
+    match controller.ask(request).expect("the daemon answers") {
         Response::Done(done) => done,
         other => panic!("{other:?}"),
     }

@@ -380,6 +380,7 @@ impl StreamCore {
             (Display::Told, true) => self.pacer.on_handed_over(plan, now),
             (_, false) => {
                 self.pacer.on_dropped();
+                self.engine.picture_dropped();
                 self.count_discarded(plan.present_at);
             }
         }
@@ -393,6 +394,7 @@ impl StreamCore {
                 self.pacer.on_presented(planned, presented_at, heard_at);
             }
             Told::Discarded { planned } => {
+                self.engine.picture_dropped();
                 self.count_discarded(planned);
                 self.pacer.on_discarded(planned);
             }

@@ -232,7 +232,7 @@ macro_rules! globals {
                 init: &mut DataInit<'_, Self>,
             ) {
                 let $resource = init.init(resource, ());
-                $on_bind;
+                let () = $on_bind;
             }
         }
     )*};

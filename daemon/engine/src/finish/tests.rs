@@ -382,7 +382,9 @@ fn luminance(profile: &DisplayProfile, picture: &ColorPlane) -> Luminance {
 
 /// Pictures that flicker as much as pictures can: stripes of full contrast at several widths.
 fn stripes(width: u32) -> ColorPlane {
-    ColorPlane::Rgba8(plane(160, 96, |x, _| Rgba8(if x / width % 2 == 0 { 0 } else { 0xff_ff_ff })))
+    ColorPlane::Rgba8(plane(160, 96, |x, _| {
+        Rgba8(if (x / width).is_multiple_of(2) { 0 } else { 0xff_ff_ff })
+    }))
 }
 
 #[test]
