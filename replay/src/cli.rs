@@ -143,7 +143,7 @@ mod tests {
     #[test]
     fn every_command_line_of_the_page_on_perception_is_one_that_exists() {
         let commands = commands(include_str!("../../docs/perception.md"));
-        assert_eq!(commands.len(), 8);
+        assert_eq!(commands.len(), 9);
         for command in commands {
             let parsed = Cli::try_parse_from(&command);
             assert!(parsed.is_ok(), "{}: {}", command.join(" "), parsed.unwrap_err());

@@ -7,7 +7,7 @@ use crate::control::StreamStatus;
 use crate::draw::palette::{DROPPED, GRID, REAL, REPEATED, Rgb, SYNTHESISED};
 use crate::draw::{Anchor, Canvas, TextStyle};
 
-const SIZE: [u32; 2] = [396, 172];
+const SIZE: [u32; 2] = [396, 182];
 const BACK: Rgb = [22, 24, 28];
 const TEXT: Rgb = [236, 236, 230];
 const FAINT: Rgb = [150, 154, 162];
@@ -25,7 +25,7 @@ pub(super) fn draw(report: &StreamStatus, latency_ms: &[f64], view: HudView) -> 
     headroom(&mut canvas, report);
     history(&mut canvas, latency_ms);
     if let Some(warning) = report.warnings.first() {
-        write(&mut canvas, warning, [12.0, 164.0], REPEATED);
+        write(&mut canvas, warning, [12.0, 175.0], REPEATED);
     }
     Some(canvas.into_pixmap())
 }

@@ -17,12 +17,13 @@ const FULL_SPEED: f32 = 32.0;
 /// How much of a view covers the picture, of 256.
 const OPACITY: u32 = 176;
 
-/// Direction of motion as hue, speed as strength; grey where nothing is known.
+/// Direction of motion as hue, the root of speed as strength, so that slow motion shows too; grey where
+/// nothing is known.
 pub(super) fn motion(inspection: Inspection<'_>, picture: &mut ColorPlane) {
     blocks(picture, |x, y| match inspection.motion_at(x, y) {
         None => ColorU8::from_rgba(128, 128, 128, 255),
         Some([dx, dy]) => {
-            let strength = (libm::hypotf(dx, dy) / FULL_SPEED).min(1.0);
+            let strength = libm::sqrtf(libm::hypotf(dx, dy) / FULL_SPEED).min(1.0);
             let [red, green, blue] = hue(libm::atan2f(dy, dx));
             ColorU8::from_rgba(red, green, blue, (255.0 * strength) as u8)
         }
