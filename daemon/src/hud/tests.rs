@@ -157,8 +157,8 @@ fn motion_shows_directions_apart_and_the_grid_moves_with_the_phase() {
     };
     assert_eq!(at(40, 40), at(90, 200), "one direction, one colour");
     assert_ne!(at(40, 40), at(WIDTH - 40, 40));
-    let strongest = at(40, 40).into_iter().max();
-    assert!(strongest > Some(100), "a slow motion of black can be seen: {:?}", at(40, 40));
+    // 6 pixels a key on black: more than a quarter of the whole range.
+    assert!(at(40, 40).into_iter().max() > Some(64), "{:?}", at(40, 40));
     assert_ne!(drawn(HudView::Grid, 0), drawn(HudView::Grid, 1));
     assert_eq!(drawn(HudView::Grid, 1), drawn(HudView::Grid, 1));
     let linear = drawn(HudView::Rungs, 0);
