@@ -47,7 +47,8 @@ pub struct Args {
     #[arg(long)]
     #[serde(default, deserialize_with = "from_name")]
     pub backend: Option<BackendChoice>,
-    /// How in-between frames are made: hold, blend, gather, grid or linear [default: linear]
+    /// How in-between frames are made: hold, blend, voxel, gather, grid, linear,
+    /// global, affine, quadratic, world or auto [default: linear]
     #[arg(long)]
     #[serde(default, deserialize_with = "from_name")]
     pub method: Option<Method>,

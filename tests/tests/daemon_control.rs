@@ -132,7 +132,11 @@ fn a_recording_that_cannot_be_made_is_refused_and_the_one_that_runs_goes_on() {
     let mut daemon = RunningDaemon::start("shm");
     let mut controller = controller(&daemon);
     done(&mut controller, &Request::Record { file: Some(daemon.path("a.mcap")) });
-    for wrong in ["relative.mcap".into(), daemon.path("no/such/folder.mcap")] {
+    // The file that is being written, by its path and by another one, would be cut to nothing.
+    let detour = daemon.path(".").join("a.mcap");
+    let running = [daemon.path("a.mcap"), detour];
+    let never = ["relative.mcap".into(), daemon.path("no/such/folder.mcap")];
+    for wrong in running.into_iter().chain(never) {
         let refused = controller.ask(&Request::Record { file: Some(wrong) }).unwrap();
         assert!(matches!(refused, Response::Refused(_)), "{refused:?}");
     }

@@ -106,7 +106,7 @@ impl Server {
             sink: config.sink.to_string(),
             refresh_hz: hz(config.refresh_interval),
             cap_hz: config.cap,
-            recording: self.recorder.is_some().then(|| config.record.clone()).flatten(),
+            recording: self.running_recording().map(Path::to_owned),
             clients: self.sessions.len(),
             streams: streams.collect(),
         }
@@ -153,6 +153,12 @@ impl Server {
     }
 
     fn change_recording(&mut self, file: Option<PathBuf>) -> Result<Vec<String>, String> {
+        if let (Some(new), Some(running)) = (&file, self.running_recording())
+            && is_same_file(new, running)
+        {
+            let new = new.display();
+            return Err(format!("record: expected another file, found the running one, {new}"));
+        }
         let started = match &file {
             Some(path) if !path.is_absolute() => {
                 let path = path.display();
@@ -168,13 +174,11 @@ impl Server {
         };
         let ended = std::mem::replace(&mut self.recorder, started);
         self.config.record = file;
-        let recorder = self.recorder.take();
         // In a file of its own a stream keeps the number that it has in the daemon.
         self.tell_streams(|ordinal| {
             let number = u32::try_from(ordinal + 1).unwrap_or(u32::MAX);
-            StreamCommand::Record(recorder.as_ref().map(|it| it.stream(number)))
+            StreamCommand::Record(self.recorder.as_ref().map(|it| it.stream(number)))
         });
-        self.recorder = recorder;
         let mut done = Vec::new();
         if let Some(ended) = ended {
             done.push("the recording before is finished".to_owned());
@@ -190,7 +194,12 @@ impl Server {
         Ok(done)
     }
 
-    /// Takes over what can change while streams run, and names what cannot.
+    fn running_recording(&self) -> Option<&Path> {
+        self.recorder.as_ref().and(self.config.record.as_deref())
+    }
+
+    /// Takes over what can change while streams run, and names what cannot. A recording is left as it
+    /// is: to go back to a file that was written before would overwrite it.
     pub(super) fn reload(&mut self) -> Result<Vec<String>, String> {
         let Some(told) = self.told.clone() else {
             return Err(
@@ -204,11 +213,6 @@ impl Server {
         }
         if new.cap != self.config.cap {
             done.extend(self.change_cap(new.cap)?);
-        }
-        if new.record != self.config.record {
-            let file = new.record.clone().map(std::path::absolute).transpose();
-            let file = file.map_err(|error| format!("reload: {error}"))?;
-            done.extend(self.change_recording(file)?);
         }
         done.extend(
             self.config
@@ -226,6 +230,14 @@ impl Server {
         for (&ordinal, stream) in &self.streams {
             stream.mailbox.command(command(ordinal));
         }
+    }
+}
+
+/// Whether both are one file that exists, by whatever path.
+fn is_same_file(a: &Path, b: &Path) -> bool {
+    match (a.canonicalize(), b.canonicalize()) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => false,
     }
 }
 

@@ -256,6 +256,12 @@ impl StreamCore {
         self.pacer.set_interpolates(method.interpolates());
     }
 
+    /// How in-between frames are made.
+    #[must_use]
+    pub fn method(&self) -> Method {
+        self.method
+    }
+
     /// What the engine makes of the newest key; None before the first.
     #[must_use]
     pub fn inspect(&self) -> Option<Inspection<'_>> {

@@ -11,7 +11,7 @@ use std::thread::{self, JoinHandle};
 
 use calloop::channel::Sender;
 use foreframe_engine::pacing::Plan;
-use foreframe_engine::{KeyReport, Method, MonoSpan, MonoTime};
+use foreframe_engine::{KeyReport, MonoSpan, MonoTime};
 use foreframe_protocol::{
     CreateStream, Error, ErrorCode, ErrorMessage, OutputFrame, OutputKind, Pacing, Presented,
     Statistics,
@@ -116,7 +116,6 @@ struct StreamThread {
     key_work: MonoSpan,
     synthesis: Mean,
     observed: Observed,
-    method: Method,
     statistics_due_at: MonoTime,
 }
 
@@ -143,7 +142,6 @@ impl StreamThread {
                 Err(error) => warn!(%error, "the CPU makes the pictures"),
             }
         }
-        let method = parts.core.engine.method;
         info!(stream = parts.ordinal, backend = core.backend().name, "stream starts");
         let window = parts.window.as_ref().and_then(|(opener, config)| {
             let mailbox = Arc::clone(&parts.mailbox);
@@ -162,7 +160,6 @@ impl StreamThread {
             key_work: MonoSpan::ZERO,
             synthesis: Mean::default(),
             observed: Observed::default(),
-            method,
             statistics_due_at: clock::now(),
         }
     }
@@ -213,7 +210,6 @@ impl StreamThread {
                     let gpu = self.parts.gpu.as_ref();
                     let gpu = gpu.and_then(|(gpus, index)| gpus.open(*index).ok());
                     self.core.set_method(method, gpu.as_ref());
-                    self.method = method;
                 }
                 StreamCommand::Record(recorder) => {
                     self.parts.recorder = recorder;
@@ -450,7 +446,7 @@ impl StreamThread {
             width: self.parts.create.format.width,
             height: self.parts.create.format.height,
             paced_by: "timer".to_owned(),
-            method: self.method.name().to_owned(),
+            method: self.core.method().name().to_owned(),
             backend: backend.name.clone(),
             rates_hz,
             on_target_percent,
