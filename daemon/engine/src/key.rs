@@ -72,6 +72,21 @@ pub struct PlaneInput<'a> {
     pub jitter: [f32; 2],
 }
 
+impl<'a> PlaneInput<'a> {
+    /// A plane of this size (columns, rows) without padding or jitter, all of it image.
+    #[must_use]
+    pub fn packed(bytes: &'a [u8], [width, height]: [u32; 2], bytes_per_pixel: u32) -> Self {
+        Self {
+            pixels: Pixels::Bytes(bytes),
+            width,
+            height,
+            stride: width * bytes_per_pixel,
+            valid: Rect::full(width, height),
+            jitter: [0.0; 2],
+        }
+    }
+}
+
 /// A key frame as it arrives: borrowed planes in the stream's declared conventions.
 #[derive(Clone, Copy, Debug)]
 pub struct KeyInput<'a> {

@@ -4,8 +4,8 @@ use foreframe_engine::color::ColorFormat;
 use foreframe_engine::format::{
     CameraMotion, MotionConvention, MotionDirection, MotionFormat, MotionUnit, StreamFormat,
 };
-use foreframe_engine::key::{KeyInput, Pixels, PlaneInput};
-use foreframe_engine::{Engine, EngineConfig, Method, MonoSpan, MonoTime, Phase, Rect};
+use foreframe_engine::key::{KeyInput, PlaneInput};
+use foreframe_engine::{Engine, EngineConfig, Method, MonoSpan, MonoTime, Phase};
 
 use super::*;
 
@@ -67,14 +67,8 @@ fn engine() -> Engine {
         .flat_map(|i| if i % WIDTH < WIDTH / 2 { [6.0_f32, 0.0] } else { [0.0, 6.0] })
         .flat_map(f32::to_le_bytes)
         .collect();
-    let plane = |bytes, pixel_bytes: u32| PlaneInput {
-        pixels: Pixels::Bytes(bytes),
-        width: WIDTH,
-        height: HEIGHT,
-        stride: WIDTH * pixel_bytes,
-        valid: Rect::full(WIDTH, HEIGHT),
-        jitter: [0.0; 2],
-    };
+    let plane =
+        |bytes, bytes_per_pixel| PlaneInput::packed(bytes, [WIDTH, HEIGHT], bytes_per_pixel);
     let content_time = MonoTime::ZERO + MonoSpan::from_ms(100);
     engine
         .push_key(&KeyInput {

@@ -146,7 +146,6 @@ pub enum Told {
 #[derive(Debug)]
 pub struct StreamCore {
     engine: Engine,
-    method: Method,
     pacer: Pacer,
     display: Display,
     /// Pictures that were handed to a display that will tell what became of them, oldest first.
@@ -199,7 +198,6 @@ impl StreamCore {
         let pacer = new_pacer(config.engine.method, refresh_interval, Some(display_origin));
         Self {
             engine: Engine::new(format, config.engine),
-            method: config.engine.method,
             pacer,
             display: Display::Timer(TimerDisplay::new(display_origin, refresh_interval)),
             under_way: VecDeque::new(),
@@ -221,14 +219,14 @@ impl StreamCore {
     pub fn use_display(&mut self, announced: Option<MonoSpan>) {
         let refresh_interval = announced.unwrap_or(self.interval());
         let deadline = FIRST_DEADLINE.min(refresh_interval.scale(FIRST_DEADLINE_PERCENT, 100));
-        self.pacer = new_pacer(self.method, refresh_interval, None).with_deadline(deadline);
+        self.pacer = new_pacer(self.method(), refresh_interval, None).with_deadline(deadline);
         self.display = Display::Told;
     }
 
     /// Shows the pictures on a timer of this interval from now on. What is known of another display
     /// is forgotten.
     pub fn use_timer(&mut self, refresh_interval: MonoSpan, origin: MonoTime) {
-        self.pacer = new_pacer(self.method, refresh_interval, Some(origin));
+        self.pacer = new_pacer(self.method(), refresh_interval, Some(origin));
         self.display = Display::Timer(TimerDisplay::new(origin, refresh_interval));
     }
 
@@ -251,7 +249,6 @@ impl StreamCore {
 
     /// Makes in-between frames by another method from now on, on `gpu` where there is one.
     pub fn set_method(&mut self, method: Method, gpu: Option<&Arc<Gpu>>) {
-        self.method = method;
         self.engine.set_method(method, gpu);
         self.pacer.set_interpolates(method.interpolates());
     }
@@ -259,7 +256,7 @@ impl StreamCore {
     /// How in-between frames are made.
     #[must_use]
     pub fn method(&self) -> Method {
-        self.method
+        self.engine.method()
     }
 
     /// What the engine makes of the newest key; None before the first.
@@ -287,7 +284,7 @@ impl StreamCore {
                 .newest_key
                 .filter(|_| !input.is_cut)
                 .map(|before| before.content_time),
-            moves: match self.method {
+            moves: match self.method() {
                 Method::Hold => false,
                 Method::Blend => true,
                 _ => report.motion == MotionState::Usable,
@@ -400,7 +397,7 @@ impl StreamCore {
                 self.pacer.on_presented(planned, presented_at, heard_at);
             }
             Told::Discarded { planned } => {
-                self.engine.picture_dropped();
+                // Too late for finishing, which has shared out the light of pictures after it.
                 self.count_discarded(planned);
                 self.pacer.on_discarded(planned);
             }
@@ -479,7 +476,7 @@ impl StreamCore {
     /// Where the picture of `content_time` came from: the engine copies a key at phase 0, and
     /// `blend` one of its two keys except between them.
     fn kind(&self, content_time: MonoTime, phase: Phase, key: &NewestKey) -> FrameKind {
-        let is_of_a_key = match self.method {
+        let is_of_a_key = match self.method() {
             Method::Hold => true,
             Method::Blend => {
                 content_time >= key.content_time

@@ -2,8 +2,7 @@
 
 use super::*;
 use crate::format::{CameraMotion, MotionConvention, MotionDirection, MotionFormat, MotionUnit};
-use crate::key::{Pixels, PlaneInput};
-use crate::plane::Rect;
+use crate::key::PlaneInput;
 
 mod change_of_method;
 
@@ -32,14 +31,7 @@ fn push(engine: &mut Engine, at_ms: i64, seed: u8) -> Result<KeyReport, DecodeEr
     let color: Vec<u8> = (0..=255_u8).flat_map(|pixel| [pixel.wrapping_add(seed); 4]).collect();
     let motion: Vec<u8> =
         (0..256).flat_map(|_| [3.0_f32, 0.0]).flat_map(f32::to_le_bytes).collect();
-    let plane = |bytes, bytes_per_pixel: u32| PlaneInput {
-        pixels: Pixels::Bytes(bytes),
-        width: SIZE,
-        height: SIZE,
-        stride: SIZE * bytes_per_pixel,
-        valid: Rect::full(SIZE, SIZE),
-        jitter: [0.0; 2],
-    };
+    let plane = |bytes, bytes_per_pixel| PlaneInput::packed(bytes, [SIZE, SIZE], bytes_per_pixel);
     let content_time = MonoTime::ZERO + MonoSpan::from_ms(at_ms);
     engine.push_key(&KeyInput {
         index: 0,
@@ -228,14 +220,8 @@ fn push_place(engine: &mut Engine, at_ms: i64, seed: u32, moved: u32) {
         (0..height).flat_map(|y| (0..width).flat_map(move |x| [shown(x, y); 4])).collect();
     let motion: Vec<u8> =
         (0..width * height).flat_map(|_| [3.0_f32, 0.0]).flat_map(f32::to_le_bytes).collect();
-    let plane = |bytes, bytes_per_pixel: u32| PlaneInput {
-        pixels: Pixels::Bytes(bytes),
-        width,
-        height,
-        stride: width * bytes_per_pixel,
-        valid: Rect::full(width, height),
-        jitter: [0.0; 2],
-    };
+    let plane =
+        |bytes, bytes_per_pixel| PlaneInput::packed(bytes, [width, height], bytes_per_pixel);
     let content_time = MonoTime::ZERO + MonoSpan::from_ms(at_ms);
     let pushed = engine.push_key(&KeyInput {
         index: 0,

@@ -3,10 +3,10 @@
 use std::cell::Cell;
 use std::num::NonZeroUsize;
 
+use foreframe_engine::PlaneInput;
 use foreframe_engine::format::{
     CameraMotion, MotionConvention, MotionDirection, MotionFormat, MotionUnit,
 };
-use foreframe_engine::{Pixels, PlaneInput, Rect};
 
 use super::*;
 
@@ -63,14 +63,8 @@ impl Rig {
         let color: Vec<u8> = (0..=255_u8).flat_map(|pixel| [pixel; 4]).collect();
         let vector = [3.0_f32, 0.0].map(f32::to_le_bytes).concat();
         let motion = vector.repeat(256);
-        let plane = |bytes, bytes_per_pixel: u32| PlaneInput {
-            pixels: Pixels::Bytes(bytes),
-            width: SIZE,
-            height: SIZE,
-            stride: SIZE * bytes_per_pixel,
-            valid: Rect::full(SIZE, SIZE),
-            jitter: [0.0; 2],
-        };
+        let plane =
+            |bytes, bytes_per_pixel| PlaneInput::packed(bytes, [SIZE, SIZE], bytes_per_pixel);
         let input = KeyInput {
             index: self.next_key,
             content_time,

@@ -5,11 +5,11 @@
 //! the tables are looked up. The caller asks the processor whether it has AVX2.
 
 use std::arch::x86_64::{
-    __m256i, _mm256_and_si256, _mm256_andnot_si256, _mm256_cmpeq_epi32, _mm256_i32gather_epi32,
-    _mm256_loadu_si256, _mm256_max_epu8, _mm256_min_epu8, _mm256_movemask_epi8, _mm256_or_si256,
-    _mm256_set1_epi8, _mm256_set1_epi32, _mm256_setr_epi8, _mm256_shuffle_epi8, _mm256_slli_epi32,
-    _mm256_srli_epi16, _mm256_srli_epi32, _mm256_storeu_si256, _mm256_subs_epu8,
-    _mm256_testz_si256,
+    __m256i, _mm_setr_epi8, _mm256_and_si256, _mm256_andnot_si256, _mm256_broadcastsi128_si256,
+    _mm256_cmpeq_epi32, _mm256_i32gather_epi32, _mm256_loadu_si256, _mm256_max_epu8,
+    _mm256_min_epu8, _mm256_movemask_epi8, _mm256_or_si256, _mm256_set1_epi8, _mm256_set1_epi32,
+    _mm256_shuffle_epi8, _mm256_slli_epi32, _mm256_srli_epi16, _mm256_srli_epi32,
+    _mm256_storeu_si256, _mm256_subs_epu8, _mm256_testz_si256,
 };
 
 use crate::color::Rgba8;
@@ -145,7 +145,7 @@ fn key(tables: &ByteTables, original: __m256i, blur: __m256i) -> __m256i {
 #[target_feature(enable = "avx2")]
 fn spread(channel: i8) -> __m256i {
     let at = |pixel: i8| 4 * pixel + channel;
-    _mm256_setr_epi8(
+    _mm256_broadcastsi128_si256(_mm_setr_epi8(
         -1,
         at(0),
         -1,
@@ -162,21 +162,5 @@ fn spread(channel: i8) -> __m256i {
         at(3),
         -1,
         -1,
-        -1,
-        at(0),
-        -1,
-        -1,
-        -1,
-        at(1),
-        -1,
-        -1,
-        -1,
-        at(2),
-        -1,
-        -1,
-        -1,
-        at(3),
-        -1,
-        -1,
-    )
+    ))
 }

@@ -48,25 +48,19 @@ fn bytes(
     for_each_valid_row(
         pool,
         valid,
+        smooth,
         picture,
         #[inline(always)]
-        |y, row| {
-            up_row(
-                smooth,
-                y,
-                #[inline(always)]
-                |sums| {
-                    let mut done = 0;
-                    #[cfg(target_arch = "x86_64")]
-                    if has_avx2() {
-                        // SAFETY: the processor has AVX2, asked for just above.
-                        done = unsafe { avx2::row(tables, split.is_key, sums, row) };
-                    }
-                    for (x, texel) in row.iter_mut().enumerate().skip(done) {
-                        *texel = tables.of(split.is_key, *texel, expanded(sums, x));
-                    }
-                },
-            );
+        |sums, row| {
+            let mut done = 0;
+            #[cfg(target_arch = "x86_64")]
+            if has_avx2() {
+                // SAFETY: the processor has AVX2, asked for just above.
+                done = unsafe { avx2::row(tables, split.is_key, sums, row) };
+            }
+            for (x, texel) in row.iter_mut().enumerate().skip(done) {
+                *texel = tables.of(split.is_key, *texel, expanded(sums, x));
+            }
         },
     );
 }
@@ -81,29 +75,25 @@ fn channels<T: Wide>(
     for_each_valid_row(
         pool,
         valid,
+        smooth,
         picture,
         #[inline(always)]
-        |y, row| {
-            up_row(
-                smooth,
-                y,
-                #[inline(always)]
-                |sums| {
-                    for (x, texel) in row.iter_mut().enumerate() {
-                        *texel = split.of(*texel, expanded(sums, x));
-                    }
-                },
-            );
+        |sums, row| {
+            for (x, texel) in row.iter_mut().enumerate() {
+                *texel = split.of(*texel, expanded(sums, x));
+            }
         },
     );
 }
 
-/// Calls `inside(row, pixels)` for every row of the part `valid` of `picture`, counted from its top.
+/// Calls `inside(sums, pixels)` for every row of the part `valid` of `picture`, with the sums of the row
+/// of `smooth` that lies there.
 fn for_each_valid_row<T: Wide>(
     pool: &ThreadPool,
     valid: Rect,
+    smooth: &Plane<T>,
     picture: &mut Plane<T>,
-    inside: impl Fn(u32, &mut [T]) + Sync,
+    inside: impl Fn(&[T::Lanes], &mut [T]) + Sync,
 ) {
     for_each_row(
         pool,
@@ -112,7 +102,13 @@ fn for_each_valid_row<T: Wide>(
         |y, row| {
             if (valid.y..valid.y + valid.height).contains(&y) {
                 let (left, right) = (valid.x as usize, (valid.x + valid.width) as usize);
-                inside(y - valid.y, &mut row[left..right]);
+                let row = &mut row[left..right];
+                up_row(
+                    smooth,
+                    y - valid.y,
+                    #[inline(always)]
+                    |sums| inside(sums, row),
+                );
             }
         },
     );
