@@ -183,4 +183,5 @@ fn without_a_display_the_daemon_says_so_in_one_line() {
     assert_eq!(status.code(), Some(1), "{said}");
     let line = said.strip_prefix("foreframed: --sink window: expected a display").expect(&said);
     assert_eq!(line.lines().count(), 1, "{said}");
+    assert!(!line.contains(".rs"), "no place in a source is told: {said}");
 }

@@ -138,13 +138,19 @@ impl WindowOpener {
     }
 }
 
+/// What winit says, without the place in its source that it names before.
+fn without_place(error: &str) -> &str {
+    let after_file = error.split_once(".rs:").and_then(|(_, line)| line.split_once(": "));
+    after_file.map_or(error, |(_, said)| said)
+}
+
 /// The life of the thread.
 fn live(options: WindowOptions, tell: Sender<Result<EventLoopProxy<Request>, WindowError>>) {
     let built = EventLoop::with_user_event().with_any_thread(true).build();
     let event_loop = match built {
         Ok(event_loop) => event_loop,
         Err(error) => {
-            let error = WindowError::NoDisplay(error.to_string());
+            let error = WindowError::NoDisplay(without_place(&error.to_string()).to_owned());
             // Whoever asked may have given up.
             return drop(tell.send(Err(error)));
         }
