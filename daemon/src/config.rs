@@ -48,7 +48,7 @@ pub struct Args {
     #[serde(default, deserialize_with = "from_name")]
     pub backend: Option<BackendChoice>,
     /// How in-between frames are made: hold, blend, voxel, gather, grid, linear,
-    /// global, affine, quadratic, world or auto [default: linear]
+    /// global, affine, quadratic, world, flow or auto [default: linear]
     #[arg(long)]
     #[serde(default, deserialize_with = "from_name")]
     pub method: Option<Method>,

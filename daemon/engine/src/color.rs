@@ -78,6 +78,10 @@ pub trait Texel: Copy + Default + PartialEq + Send + Sync + 'static {
     #[must_use]
     fn luma(self) -> i32;
 
+    /// The same in 8 bits, of light from 0 to the format's usual white or beyond.
+    #[must_use]
+    fn luma8(self) -> u8;
+
     /// [`Texel::bilinear`] of pixels `i` and `i + 1` of `top` and `bottom` into each `out[i]`.
     #[inline(always)]
     fn bilinear_run(top: &[Self], bottom: &[Self], fx: u32, fy: u32, out: &mut [Self]) {
@@ -145,6 +149,11 @@ impl Texel for Rgba8 {
         packed_luma(self.0, RGBA8_FIELDS)
     }
 
+    #[inline(always)]
+    fn luma8(self) -> u8 {
+        (packed_luma(self.0, RGBA8_FIELDS) >> 2) as u8
+    }
+
     #[inline]
     fn bilinear(corners: [Self; 4], fx: u32, fy: u32) -> Self {
         #[cfg(target_arch = "x86_64")]
@@ -196,6 +205,11 @@ impl Texel for Rgb10a2 {
         packed_luma(self.0, RGB10A2_FIELDS)
     }
 
+    #[inline(always)]
+    fn luma8(self) -> u8 {
+        (packed_luma(self.0, RGB10A2_FIELDS) >> 4) as u8
+    }
+
     fn bilinear(corners: [Self; 4], fx: u32, fy: u32) -> Self {
         let weights = bilinear_weights(fx, fy);
         Self(packed_channels(corners.map(|c| c.0), RGB10A2_FIELDS, |c| weigh(c, weights)))
@@ -211,6 +225,13 @@ impl Texel for OrderedRgba16 {
     fn luma(self) -> i32 {
         let [red, green, blue, _] = self.0.map(i32::from);
         (red + 2 * green + blue) >> 4
+    }
+
+    /// What is below 0 is 0. Finite light reaches to 248, light up to 1 to 120.
+    #[inline(always)]
+    fn luma8(self) -> u8 {
+        const ZERO: i32 = (4 * 0x8000) >> 4;
+        ((self.luma() - ZERO) >> 5).clamp(0, 255) as u8
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "a weighted mean of 16 bits has 16 bits")]

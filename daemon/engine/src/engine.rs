@@ -22,6 +22,7 @@ use crate::method::Method;
 use crate::phase::Phase;
 use crate::simd::Simd;
 use crate::time::{MonoSpan, MonoTime};
+use crate::trajectory::flow::Flow;
 use crate::trajectory::ladder::Ladder;
 
 /// What an engine does and with how much of the machine.
@@ -78,12 +79,25 @@ pub struct KeyReport {
 pub enum MotionState {
     /// The key has a usable motion field.
     Usable,
-    /// The key, or the stream, has no motion plane.
+    /// It has none, or the method takes no notice of it: motion was estimated from this picture and
+    /// the one before.
+    Estimated,
+    /// The key, or the stream, has no motion plane, and there is no picture before it to estimate
+    /// motion from, or nothing in common with it.
     Missing,
     /// The key is a cut: its motion points into another scene.
     Cut,
-    /// Vectors lack the camera's motion, and the key has no depth or not both cameras.
+    /// Vectors lack the camera's motion, the key has no depth or not both cameras, and there is
+    /// nothing to estimate it from either.
     LacksCamera,
+}
+
+impl MotionState {
+    /// Whether frames after the key can move.
+    #[must_use]
+    pub const fn moves(self) -> bool {
+        matches!(self, Self::Usable | Self::Estimated)
+    }
 }
 
 /// What making one in-between frame led to.
@@ -120,6 +134,7 @@ pub struct Engine {
 struct Scratch {
     decode: DecodeScratch,
     map: FieldMap,
+    flow: Flow,
 }
 
 impl Engine {
@@ -213,17 +228,26 @@ impl Engine {
         {
             return Err(DecodeError::TimeBackwards { newest, found: input.content_time });
         }
+        let is_by_flow = self.config.method == Method::Flow;
+        let seen = KeyInput {
+            motion: input.motion.filter(|_| !is_by_flow),
+            motion_from: input.motion_from.filter(|_| !is_by_flow),
+            ..*input
+        };
         let noticed = decode_key(
             &self.pool,
             &self.format,
-            input,
+            &seen,
             self.config.pixels_per_degree,
             &mut self.scratch.decode,
             &mut self.spare,
         )?;
         let mut key = std::mem::take(&mut self.spare);
+        let has_none = key.motion_from.is_none() && !key.is_cut;
+        let is_estimated = has_none && self.estimate_motion(&mut key);
         let motion = match key.motion_from {
             _ if key.is_cut => MotionState::Cut,
+            Some(_) if is_estimated => MotionState::Estimated,
             Some(_) => MotionState::Usable,
             None if noticed.lacks_camera_motion => MotionState::LacksCamera,
             None => MotionState::Missing,
@@ -258,6 +282,20 @@ impl Engine {
             motion,
             depth_contradiction: noticed.depth_contradiction,
         })
+    }
+
+    /// Estimates the motion of `key`, which has none, from its picture and the newest one's. Returns
+    /// whether that was wanted and possible.
+    fn estimate_motion(&mut self, key: &mut KeyFrame) -> bool {
+        let wanted = self.newest.as_ref().filter(|_| self.config.method.follows_motion());
+        let Some(older) = wanted else { return false };
+        let Scratch { decode, flow, .. } = &mut self.scratch;
+        let is_found = flow.find(&self.pool, key, older);
+        if is_found {
+            let pixels_per_degree = self.config.pixels_per_degree;
+            decode.take_flow(&self.pool, flow, older.content_time, pixels_per_degree, key);
+        }
+        is_found
     }
 
     /// The client has moved the camera on to `view` (world to view, column-major) at

@@ -28,6 +28,9 @@ pub enum Method {
     Quadratic,
     /// As `linear`, seen by a camera that goes on along its own path; needs depth and cameras.
     World,
+    /// As `linear`, along motion estimated from the two newest pictures; needs no motion plane, and
+    /// takes no notice of one.
+    Flow,
     /// The ladder: for every surface the cheapest of `hold`, `global`, `linear`, `affine`,
     /// `quadratic` and `world` that the last keys have shown to be good enough.
     Auto,
@@ -35,7 +38,7 @@ pub enum Method {
 
 impl Method {
     /// Every method, in the order in which tables list them.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Hold,
         Self::Blend,
         Self::Voxel,
@@ -46,6 +49,7 @@ impl Method {
         Self::Affine,
         Self::Quadratic,
         Self::World,
+        Self::Flow,
         Self::Auto,
     ];
 
@@ -63,6 +67,7 @@ impl Method {
             Self::Affine => "affine",
             Self::Quadratic => "quadratic",
             Self::World => "world",
+            Self::Flow => "flow",
             Self::Auto => "auto",
         }
     }
@@ -75,9 +80,12 @@ impl Method {
             Self::Hold | Self::Blend | Self::Voxel | Self::Gather | Self::Grid | Self::Linear => {
                 self
             }
-            Self::Global | Self::Affine | Self::Quadratic | Self::World | Self::Auto => {
-                Self::Linear
-            }
+            Self::Global
+            | Self::Affine
+            | Self::Quadratic
+            | Self::World
+            | Self::Flow
+            | Self::Auto => Self::Linear,
         }
     }
 
@@ -85,6 +93,12 @@ impl Method {
     #[must_use]
     pub const fn runs_on_gpus(self) -> bool {
         !matches!(self, Self::Voxel)
+    }
+
+    /// Whether it goes by motion, and so by an estimate where a key has none.
+    #[must_use]
+    pub const fn follows_motion(self) -> bool {
+        !matches!(self, Self::Hold | Self::Blend)
     }
 
     /// Whether it follows cameras, and so late ones too.

@@ -9,7 +9,6 @@ use std::sync::Arc;
 
 use foreframe_engine::backend::BackendStatus;
 use foreframe_engine::backend::gpu::Gpu;
-use foreframe_engine::engine::MotionState;
 use foreframe_engine::inspect::Inspection;
 use foreframe_engine::pacing::{
     Pacer, PacerConfig, PacerStatus, Plan, RefreshKind, TimerDisplay, WorkEstimate,
@@ -287,7 +286,7 @@ impl StreamCore {
             moves: match self.method() {
                 Method::Hold => false,
                 Method::Blend => true,
-                _ => report.motion == MotionState::Usable,
+                _ => report.motion.moves(),
             },
             taken: self.counts.keys,
         });

@@ -10,8 +10,9 @@ use std::sync::{Arc, Once};
 use std::thread::{self, JoinHandle};
 
 use calloop::channel::Sender;
+use foreframe_engine::engine::MotionState;
 use foreframe_engine::pacing::Plan;
-use foreframe_engine::{KeyReport, MonoSpan, MonoTime};
+use foreframe_engine::{KeyReport, Method, MonoSpan, MonoTime};
 use foreframe_protocol::{
     CreateStream, Error, ErrorCode, ErrorMessage, OutputFrame, OutputKind, Pacing, Presented,
     Statistics,
@@ -112,6 +113,8 @@ struct StreamThread {
     repeats_in_a_row: u32,
     /// Whether it was said that the CPU took over from the GPU.
     told_of_fall: bool,
+    /// Whether it was said that motion is estimated.
+    told_of_estimate: bool,
     /// What taking in the newest key took.
     key_work: MonoSpan,
     synthesis: Mean,
@@ -157,6 +160,7 @@ impl StreamThread {
             refused: 0,
             repeats_in_a_row: 0,
             told_of_fall: false,
+            told_of_estimate: false,
             key_work: MonoSpan::ZERO,
             synthesis: Mean::default(),
             observed: Observed::default(),
@@ -253,6 +257,7 @@ impl StreamThread {
         };
         let Submission { submit, arrived_at, .. } = submission;
         trace!(key = submit.key_index, work = %report.work, "key taken in");
+        self.watch_motion(report.motion);
         self.key_work = clock::now() - started_at;
         self.repeats_in_a_row = 0;
         self.owes_picture = true;
@@ -358,6 +363,16 @@ impl StreamThread {
         if let Some(why) = self.core.backend().fell_back.as_ref().filter(|_| !self.told_of_fall) {
             warn!(stream = self.parts.ordinal, why, "the CPU makes the pictures from now on");
             self.told_of_fall = true;
+        }
+    }
+
+    /// Says once that keys come without motion.
+    fn watch_motion(&mut self, motion: MotionState) {
+        let is_told = motion == MotionState::Estimated && self.core.method() != Method::Flow;
+        if is_told && !self.told_of_estimate {
+            let stream = self.parts.ordinal;
+            warn!(stream, "a key without usable motion: it is estimated from the pictures");
+            self.told_of_estimate = true;
         }
     }
 

@@ -30,7 +30,7 @@ pub struct Args {
     #[arg(value_name = "FILE.mcap")]
     pub capture: PathBuf,
     /// How in-between frames are made: hold, blend, voxel, gather, grid, linear,
-    /// global, affine, quadratic, world or auto.
+    /// global, affine, quadratic, world, flow or auto.
     #[arg(long, default_value_t = Method::Linear)]
     pub method: Method,
     /// What makes the pictures, which does not change them: auto, cpu, gpu or gpu:NAME.

@@ -30,7 +30,9 @@ use crate::color::ColorPlane;
 use crate::format::{CameraMotion, DepthMeaning, StreamFormat};
 use crate::key::{KeyFrame, KeyInput};
 use crate::plane::{Plane, Rect};
+use crate::time::MonoTime;
 use crate::trajectory::dilate_motion::{DilateParams, dilate_motion};
+use crate::trajectory::flow::Flow;
 use camera::ProjectionDepth;
 use field::FieldInput;
 use geometry::CheckedPlane;
@@ -47,6 +49,28 @@ impl DecodeScratch {
     /// Gives `key`, which was decoded last and has motion, its motion as decoded.
     pub fn hand_displacement(&mut self, key: &mut KeyFrame) {
         std::mem::swap(&mut self.displacement, &mut key.displacement);
+    }
+
+    /// Gives `key`, which was decoded last and has no motion, that which `flow` found since `from`, as
+    /// if it had been decoded. Motion that no eye can follow is damped where `pixels_per_degree` is
+    /// given.
+    pub fn take_flow(
+        &mut self,
+        pool: &ThreadPool,
+        flow: &Flow,
+        from: MonoTime,
+        pixels_per_degree: Option<f32>,
+        key: &mut KeyFrame,
+    ) {
+        let mut cells = [key.depth.width(), key.depth.height()];
+        if cells.contains(&0) {
+            cells = flow.cells();
+            key.field_offset = [0; 2];
+        }
+        flow.fill(cells, &mut self.displacement);
+        let params = DilateParams { pixels_per_degree, span: key.content_time - from };
+        dilate_motion(pool, &params, &key.depth, &self.displacement, &mut key.velocity);
+        key.motion_from = Some(from);
     }
 }
 

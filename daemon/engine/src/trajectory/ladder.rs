@@ -175,7 +175,8 @@ impl Ladder {
             | Method::Voxel
             | Method::Gather
             | Method::Grid
-            | Method::Linear => {
+            | Method::Linear
+            | Method::Flow => {
                 return None;
             }
         };

@@ -27,12 +27,14 @@ fn of(points: &[MethodPoint], method: Method) -> &MethodPoint {
 }
 
 #[test]
-fn without_motion_a_method_that_needs_it_holds_the_key_and_recovers_with_the_next() {
+fn without_motion_a_method_that_needs_it_estimates_it_and_recovers_with_the_next() {
     let sound = run_case(&case(None, Vec::new()), &METHODS).unwrap();
     let blind = run_case(&case(Some(Spoil::MotionMissing), Vec::new()), &METHODS).unwrap();
     let [hold, linear] = [Method::Hold, Method::Linear];
-    assert!(of(&sound, linear).psnr_rgb_db > of(&sound, hold).psnr_rgb_db + 5.0);
-    assert!((of(&blind, linear).psnr_rgb_db - of(&blind, hold).psnr_rgb_db).abs() < 1e-9);
+    let gain =
+        |points: &[MethodPoint]| of(points, linear).psnr_rgb_db - of(points, hold).psnr_rgb_db;
+    assert!(gain(&sound) > 5.0);
+    assert!((2.0..gain(&sound)).contains(&gain(&blind)), "{} dB", gain(&blind));
     assert_eq!(of(&blind, linear).keys_to_recover, Some(1));
     assert_eq!(of(&blind, hold), of(&sound, hold), "hold looks at no motion");
 }
