@@ -175,7 +175,7 @@ fn new_pacer(method: Method, refresh_interval: MonoSpan, known_refresh: Option<M
         refresh: RefreshKind::Fixed,
         known_refresh,
         interpolates: method.interpolates(),
-        work: WorkEstimate::Measured { first: refresh_interval.scale(1, 4) },
+        work: WorkEstimate::Measured { first: refresh_interval.scale(3, 4) },
     })
 }
 
@@ -324,7 +324,8 @@ impl StreamCore {
         let started_at = clock();
         let report = self.engine.synthesise(content_time, &mut self.frame)?;
         let ready_at = clock();
-        self.pacer.on_work(ready_at - plan.wake_at.min(started_at));
+        // A head start that was not used took nobody's time.
+        self.pacer.on_work(ready_at - plan.wake_by.min(started_at));
         let kind = self.kind(content_time, report.phase, &key);
         let presented_at = match self.display {
             Display::Timer(timer) => timer.refresh_at_or_after(ready_at),

@@ -237,7 +237,7 @@ impl StreamThread {
     fn make_picture_first(&mut self) {
         let now = clock::now();
         let plan = self.core.plan(now);
-        let budget = plan.present_at - plan.wake_at;
+        let budget = plan.present_at - plan.wake_by;
         let is_at_stake = now + self.key_work + budget > plan.present_at;
         let is_idle = plan.content_time.is_none() || self.repeats_in_a_row >= REPEATS_BEFORE_IDLE;
         if is_at_stake && !is_idle {

@@ -41,7 +41,7 @@ const MARGIN_DECAY_DIVISOR: i64 = 50;
 pub enum WorkEstimate {
     /// Learned from [`Pacer::on_work`](super::Pacer::on_work); `first` before anything was measured.
     Measured {
-        /// Guess for the first picture.
+        /// Guess for the first in-between frame.
         first: MonoSpan,
     },
     /// Always this, so that plans repeat exactly.
@@ -74,6 +74,8 @@ struct RecentWork {
     measured: Option<MonoSpan>,
     /// The longest of `work`.
     longest: MonoSpan,
+    /// Whether more than one was measured.
+    is_warm: bool,
     /// Frames since the last spike, and since the one before that.
     since_spike: Option<u32>,
     since_spike_before: Option<u32>,
@@ -87,6 +89,10 @@ impl RecentWork {
         later(&mut self.since_spike_before);
         if self.measured.is_some_and(|usual| work > usual + margin) {
             self.since_spike_before = self.since_spike.replace(0);
+        }
+        if !self.is_warm && self.work.len() == 1 {
+            self.work.clear(); // the very first found nothing in any cache
+            self.is_warm = true;
         }
         self.work.push(work.max(MonoSpan::ZERO));
         self.measured = self.work.percentile(WORK_PERCENTILE);
@@ -104,19 +110,19 @@ impl Budget {
         Self { estimate, keys, in_betweens, margin: MARGIN_FLOOR }
     }
 
-    /// Expected time from wake to the picture being ready. Of a kind that was not measured yet the
-    /// same as of the other.
+    /// Expected time from wake to the picture being ready. A key that was not measured yet takes
+    /// no longer than an in-between frame; what is made of keys says nothing about these.
     pub(super) fn work(&self, shows: Shows, refresh_interval: MonoSpan) -> MonoSpan {
-        let (own, other) = match shows {
-            Shows::Key => (&self.keys, &self.in_betweens),
-            Shows::InBetween => (&self.in_betweens, &self.keys),
-        };
         match self.estimate {
             WorkEstimate::Constant(work) => work.max(MonoSpan::ZERO),
             WorkEstimate::Measured { first } => {
                 let first = first.max(MonoSpan::ZERO);
-                let usual = match own.measured.or(other.measured) {
-                    None => first,
+                let (own, unmeasured) = match shows {
+                    Shows::Key => (&self.keys, self.in_betweens.measured.unwrap_or(first)),
+                    Shows::InBetween => (&self.in_betweens, first),
+                };
+                let usual = match own.measured {
+                    None => unmeasured,
                     Some(measured) if own.work.len() < WORK_TO_LEARN => {
                         measured.max(first.min(measured.scale(3, 2)))
                     }
@@ -245,10 +251,13 @@ mod tests {
         let work = |budget: &Budget| budget.work(Shows::InBetween, REFRESH);
         assert_eq!(work(&budget), MonoSpan::from_ms(7));
         assert_eq!(budget.work_at_best(REFRESH), REFRESH.scale(1, 4));
+        budget.on_work(Shows::Key, MonoSpan::from_ms(1));
+        assert_eq!(work(&budget), MonoSpan::from_ms(7), "a key tells nothing");
+        budget.on_work(Shows::InBetween, MonoSpan::from_ms(30));
         budget.on_work(Shows::InBetween, MonoSpan::from_ms(2));
-        assert_eq!(work(&budget), MonoSpan::from_ms(3));
+        assert_eq!(work(&budget), MonoSpan::from_ms(3), "a slow start is forgotten");
         assert_eq!(budget.work_at_best(REFRESH), MonoSpan::from_ms(2));
-        (1..WORK_TO_LEARN).for_each(|_| budget.on_work(Shows::InBetween, MonoSpan::from_ms(2)));
+        (0..WORK_TO_LEARN).for_each(|_| budget.on_work(Shows::InBetween, MonoSpan::from_ms(2)));
         assert_eq!(work(&budget), MonoSpan::from_ms(2));
     }
 }

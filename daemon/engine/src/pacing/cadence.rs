@@ -5,6 +5,9 @@
 //! content time of the key before, holds the key interval, the jitter of content times and the
 //! jitter of arrivals together. Statistics are ranks, so that the late and missing keys which they
 //! are there to detect do not move them.
+//!
+//! It also tells until when no key is to be expected, from the shortest interval and the earliest
+//! arrival among recent keys.
 
 use super::easing::Easing;
 use super::recent::Recent;
@@ -22,6 +25,8 @@ const LONGEST_LEAD_HALVES: i64 = 5;
 /// Key intervals are even if from the 5th to the 95th percentile they differ by less than a tenth of
 /// the refresh interval.
 const EVEN_DIVISOR: i64 = 10;
+/// No key of late was early enough to come this much before it is expected.
+const SURPRISE: MonoSpan = MonoSpan::from_us(500);
 /// An application keeps up with a display if its usual key interval is at most this share of the
 /// refresh interval, in percent, and even,
 const KEEP_UP_PERCENT: i64 = 102;
@@ -34,12 +39,16 @@ pub(super) struct KeyCadence {
     previous: Option<MonoTime>,
     intervals: Recent<INTERVAL_WINDOW>,
     gaps: Recent<GAP_WINDOW>,
+    /// From the content time of each key to its arrival.
+    arrivals: Recent<GAP_WINDOW>,
     /// Median of `intervals`. None before the second key.
     interval: Option<MonoSpan>,
     /// The longest gap that is no outlier. None without gaps.
     usual_gap: Option<MonoSpan>,
     /// None before `INTERVAL_WINDOW` keys.
     evenness: Option<Evenness>,
+    /// None before `INTERVAL_WINDOW` keys.
+    quiet_until: Option<MonoTime>,
 }
 
 /// How evenly keys come.
@@ -54,8 +63,14 @@ struct Evenness {
 }
 
 impl KeyCadence {
-    /// A key with `content_time` has arrived; `first_refresh` is the first that can show it.
-    pub(super) fn on_key(&mut self, content_time: MonoTime, first_refresh: MonoTime) {
+    /// A key with `content_time` has arrived at `arrived_at`; `first_refresh` is the first that can
+    /// show it.
+    pub(super) fn on_key(
+        &mut self,
+        content_time: MonoTime,
+        arrived_at: MonoTime,
+        first_refresh: MonoTime,
+    ) {
         if let Some(previous) = self.previous.filter(|&previous| previous < content_time) {
             self.intervals.push(content_time - previous);
             self.gaps.push(first_refresh - previous);
@@ -63,6 +78,8 @@ impl KeyCadence {
             self.usual_gap = self.upper_fence();
             self.evenness = self.measure_evenness();
         }
+        self.arrivals.push(arrived_at - content_time);
+        self.quiet_until = self.next_at_the_earliest(content_time);
         self.previous = Some(content_time);
     }
 
@@ -70,6 +87,8 @@ impl KeyCadence {
     pub(super) fn on_clock_step(&mut self, content_time: MonoTime) {
         self.previous = Some(content_time);
         self.gaps.clear();
+        self.arrivals.clear();
+        self.quiet_until = None;
         self.usual_gap = None;
         self.evenness = None;
     }
@@ -77,6 +96,12 @@ impl KeyCadence {
     /// Usual content time from one key to the next. None before the second key.
     pub(super) fn interval(&self) -> Option<MonoSpan> {
         self.interval
+    }
+
+    /// No key is expected before this, going by the earliest of recent ones. None if any instant may
+    /// bring one.
+    pub(super) fn quiet_until(&self) -> Option<MonoTime> {
+        self.quiet_until
     }
 
     /// Whether keys come one for each refresh, or more: there is nothing to put in between then.
@@ -108,6 +133,12 @@ impl KeyCadence {
         Some(upper + (upper - middle).scale(2, 1))
     }
 
+    fn next_at_the_earliest(&self, content_time: MonoTime) -> Option<MonoTime> {
+        let (interval, arrival) = (self.intervals.min()?, self.arrivals.min()?);
+        let is_known = self.arrivals.len() >= INTERVAL_WINDOW;
+        is_known.then(|| content_time + interval + arrival - SURPRISE)
+    }
+
     fn measure_evenness(&self) -> Option<Evenness> {
         if self.gaps.len() < INTERVAL_WINDOW {
             return None;
@@ -132,7 +163,7 @@ mod tests {
     #[test]
     fn one_key_alone_moves_on_for_the_usual_interval_of_a_slow_application() {
         let mut cadence = KeyCadence::default();
-        cadence.on_key(ms(100), ms(108));
+        cadence.on_key(ms(100), ms(101), ms(108));
         assert_eq!(cadence.interval(), None);
         assert_eq!(cadence.easing(MonoSpan::from_ms(8)).full_until, FIRST_INTERVAL);
     }
@@ -143,7 +174,7 @@ mod tests {
         for key in 0..64 {
             if key % 16 != 3 {
                 let late = if key % 16 == 9 { 60 } else { 0 };
-                cadence.on_key(ms(key * 25), ms(key * 25 + 8 + late));
+                cadence.on_key(ms(key * 25), ms(key * 25), ms(key * 25 + 8 + late));
             }
         }
         assert_eq!(cadence.interval(), Some(MonoSpan::from_ms(25)));
@@ -155,11 +186,29 @@ mod tests {
     fn jitter_of_arrivals_postpones_the_overdue_instant() {
         let mut cadence = KeyCadence::default();
         for key in 0..64 {
-            cadence.on_key(ms(key * 25), ms(key * 25 + 8 + (key * 7) % 11));
+            cadence.on_key(ms(key * 25), ms(key * 25), ms(key * 25 + 8 + (key * 7) % 11));
         }
         let easing = cadence.easing(MonoSpan::from_ms(8));
         assert!(easing.full_until >= MonoSpan::from_ms(34), "{easing:?}");
         assert!(easing.full_until <= MonoSpan::from_ms(40), "{easing:?}");
+    }
+
+    #[test]
+    fn no_key_is_expected_before_the_earliest_of_late() {
+        let mut cadence = KeyCadence::default();
+        let mut quiet = vec![];
+        for key in 0..64 {
+            let arrived_at = ms(key * 25 + 5 + (key % 4));
+            quiet.push((arrived_at, cadence.quiet_until()));
+            cadence.on_key(ms(key * 25), arrived_at, ms(key * 25 + 8));
+        }
+        assert_eq!(quiet[INTERVAL_WINDOW - 1].1, None, "too few to tell");
+        for (arrived_at, until) in &quiet[INTERVAL_WINDOW..] {
+            let early = *arrived_at - until.unwrap();
+            assert!(early >= SURPRISE && early <= MonoSpan::from_ms(3) + SURPRISE, "{early:?}");
+        }
+        cadence.on_clock_step(ms(5_000));
+        assert_eq!(cadence.quiet_until(), None, "nothing is known after a step");
     }
 
     #[test]
@@ -170,7 +219,7 @@ mod tests {
             for key in 0..64 {
                 let content = key * key_us + (key % 2) * jitter_us;
                 let time = |us| MonoTime::ZERO + MonoSpan::from_us(us);
-                cadence.on_key(time(content), time(content + wait(key)));
+                cadence.on_key(time(content), time(content), time(content + wait(key)));
             }
             cadence.keeps_up_with(refresh)
         };

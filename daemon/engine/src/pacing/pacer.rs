@@ -28,6 +28,9 @@ const EARLY_PERCENT: i64 = 30;
 const EARLY_TO_REPHASE: u32 = 4;
 /// A picture that is ready sooner is handed over this share of an interval before it has to be.
 const EARLY_DIVISOR: i64 = 8;
+/// While no key is expected, pictures are begun this share of an interval before they have to be:
+/// longer than an operating system usually keeps a thread waiting, 2 ms at 120 Hz.
+const HEAD_START_DIVISOR: i64 = 4;
 /// So many frames in a row that the display throws away mean that nobody sees them.
 const DISCARDS_TO_HIDE: u32 = 16;
 /// So many of them in a row are no fault of the pacing, and widen no margin.
@@ -121,7 +124,9 @@ impl Pacer {
         let can_foresee = self.variable.is_none() && self.cadence.is_even(self.interval());
         let reachable = |ready_at| can_foresee.then(|| refresh.at_or_after(ready_at));
         match self.clock.on_key(&offer, self.lag_limit(), reachable) {
-            KeyTiming::Followed => self.cadence.on_key(content_time, first_refresh),
+            KeyTiming::Followed => {
+                self.cadence.on_key(content_time, arrived_at, first_refresh);
+            }
             KeyTiming::Stepped => {
                 self.counts.clock_steps += 1;
                 self.cadence.on_clock_step(content_time);
@@ -151,7 +156,8 @@ impl Pacer {
         let hand_over = self.budget.hand_over(interval);
         let deadline = present_at - self.offset();
         let submit_by = (deadline - hand_over).max(now);
-        let wake_at = (present_at - self.budget_of(shows)).max(now);
+        let wake_by = (present_at - self.budget_of(shows)).max(now);
+        let wake_at = (wake_by - self.head_start(wake_by, shows)).max(now);
         let submit_from = match (&self.variable, shows) {
             // A display without a beam shows what comes early early.
             (None, _) if self.knows_phase() => submit_by - interval.scale(1, EARLY_DIVISOR),
@@ -160,7 +166,18 @@ impl Pacer {
         };
         let submit_from = submit_from.min(submit_by).max(now);
         let content_time = self.content_time_at(present_at);
-        Plan { wake_at, submit_from, submit_by, present_at, content_time }
+        Plan { wake_at, wake_by, submit_from, submit_by, present_at, content_time }
+    }
+
+    /// How much sooner a picture is begun than it has to be by `wake_by`. A key that comes between the
+    /// two would be shown a refresh later for it, so only while none is expected.
+    fn head_start(&self, wake_by: MonoTime, shows: Shows) -> MonoSpan {
+        let is_quiet = self.cadence.quiet_until().is_some_and(|until| wake_by < until);
+        if is_quiet && shows == Shows::InBetween && self.variable.is_none() {
+            self.interval().scale(1, HEAD_START_DIVISOR)
+        } else {
+            MonoSpan::ZERO
+        }
     }
 
     /// The refresh to make the next picture for: one that an in-between frame can make, or an
@@ -206,8 +223,8 @@ impl Pacer {
         self.debug_verify();
     }
 
-    /// Making the frame that was started last took `work`, from its planned wake to the picture
-    /// being ready.
+    /// Making the frame that was started last took `work`, from its start, or from the plan's `wake_by`
+    /// if it started after that, to the picture being ready.
     pub fn on_work(&mut self, work: MonoSpan) {
         self.budget.on_work(self.in_work, work);
         self.debug_verify();

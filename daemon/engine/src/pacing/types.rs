@@ -30,12 +30,15 @@ pub enum RefreshKind {
     Variable,
 }
 
-/// The next frame. `wake_at <= submit_by <= present_at` and `submit_from <= submit_by`; none lies
-/// before the `now` it was planned at.
+/// The next frame. `wake_at <= wake_by <= submit_by <= present_at` and `submit_from <= submit_by`;
+/// none lies before the `now` it was planned at.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Plan {
-    /// When to start to make the picture.
+    /// When to start to make the picture: sooner than it has to be while no key is expected, so that
+    /// work that takes longer than usual is still done in time.
     pub wake_at: MonoTime,
+    /// When to start at the latest, going by what the work usually takes.
+    pub wake_by: MonoTime,
     /// When it may be handed over at the earliest: sooner, and it might be shown a refresh early.
     pub submit_from: MonoTime,
     /// When it has to be handed to the display at the latest, for displays that need it some time

@@ -259,7 +259,8 @@ impl World {
         let plan = self.pacer.plan(self.now);
         prop_assert_eq!(plan, self.pacer.plan(self.now), "planning changes nothing");
         prop_assert!(plan.wake_at >= self.now, "the wake lies in the past: {:?}", plan);
-        prop_assert!(plan.wake_at <= plan.submit_by && plan.submit_by <= plan.present_at);
+        prop_assert!(plan.wake_at <= plan.wake_by && plan.wake_by <= plan.submit_by);
+        prop_assert!(plan.submit_by <= plan.present_at);
         prop_assert!(self.now <= plan.submit_from && plan.submit_from <= plan.submit_by);
         prop_assert!(plan.present_at > self.last_target, "a refresh was taken twice: {:?}", plan);
         let status = self.pacer.status();

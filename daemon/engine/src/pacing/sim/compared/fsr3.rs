@@ -91,6 +91,7 @@ impl Planner for Fsr3Style {
         let ahead = mean.scale(self.frames_of_newest, frames);
         Plan {
             wake_at,
+            wake_by: wake_at,
             submit_from: target,
             submit_by: target,
             present_at: target,

@@ -51,6 +51,7 @@ impl Planner for GamescopeStyle {
         let present_at = next_multiple(last_vblank, self.interval, (now + lead).max(free));
         Plan {
             wake_at: present_at - lead,
+            wake_by: present_at - lead,
             submit_from: now,
             submit_by: present_at,
             present_at,

@@ -60,6 +60,7 @@ impl Planner for MonadoStyle {
             next_multiple(last_present, self.interval, (now + self.composing).max(free));
         Plan {
             wake_at: present_at - self.composing,
+            wake_by: present_at - self.composing,
             submit_from: now,
             submit_by: present_at,
             present_at,

@@ -32,6 +32,7 @@ impl Planner for NaiveTimer {
         let ahead = self.interval.scale(self.frames_of_newest, 1);
         Plan {
             wake_at,
+            wake_by: wake_at,
             submit_from: wake_at,
             submit_by: present_at,
             present_at,
