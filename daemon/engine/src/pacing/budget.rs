@@ -1,6 +1,6 @@
 //! How long before a refresh work has to start: the work itself, and a margin for the hand-over.
 //!
-//! Work is the 95th percentile of recent frames, counted from the planned wake, so that late
+//! Work is the 95th percentile of recent frames, counted from the last instant to start, so that late
 //! scheduling counts as work. A key shown as it is takes a fraction of what an in-between frame
 //! takes, and is estimated apart. The margin widens at once after a miss and shrinks slowly.
 //!
