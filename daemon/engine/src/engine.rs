@@ -24,6 +24,7 @@ use crate::simd::Simd;
 use crate::time::{MonoSpan, MonoTime};
 use crate::trajectory::flow::Flow;
 use crate::trajectory::ladder::Ladder;
+use crate::ui::{UiInput, UiLayer, composite};
 
 /// What an engine does and with how much of the machine.
 #[derive(Clone, Copy, Debug)]
@@ -127,6 +128,7 @@ pub struct Engine {
     backend: Backend,
     /// Of streams whose pictures are finished.
     finish: Option<Finish>,
+    ui: UiLayer,
 }
 
 /// Buffers of the steps, kept from frame to frame.
@@ -152,6 +154,7 @@ impl Engine {
             ladder: Ladder::new(config.method, config.pixels_per_degree),
             backend: Backend::default(),
             finish: Finish::new(&format, &config.finish, config.pixels_per_degree),
+            ui: UiLayer::default(),
         }
     }
 
@@ -309,6 +312,15 @@ impl Engine {
         }
     }
 
+    /// Shows this user interface over every picture from now on, in the place of the one before.
+    /// It may come before the first key, and stays across cuts.
+    ///
+    /// # Errors
+    /// If its numbers do not describe pixels that are there. What was shown before stays.
+    pub fn set_ui(&mut self, input: &UiInput<'_>) -> Result<(), DecodeError> {
+        self.ui.set(&self.pool, self.format.color, input)
+    }
+
     /// Brings the newest key's trajectories up to the late camera.
     fn catch_up(&mut self) {
         let Some((ladder, key)) = self.ladder.as_mut().zip(self.newest.as_mut()) else { return };
@@ -383,6 +395,7 @@ impl Engine {
         if let Some((finish, part)) = self.finish.as_mut().zip(part).filter(|_| !is_finished) {
             finish.apply(&self.pool, part, key.valid, out);
         }
+        composite(&self.pool, &self.ui, out);
         // What lies before the newest key has no position after it.
         let phase = if self.config.method.interpolates() { Phase::ZERO } else { phase };
         Some(FrameReport { key_index: key.index, phase, work: (self.config.timer)() - started_at })

@@ -56,6 +56,7 @@ pub const KERNELS: &[Kernel] = &[
     exact("warp/voxel", "warp_voxel", None),
     exact("finish/pyramid", "pyramid", Some(&PYRAMID)),
     exact("finish/compensate", "compensate", Some(&COMPENSATE)),
+    exact("ui", "composite", None),
 ];
 
 #[cfg(test)]

@@ -37,6 +37,7 @@ pub mod simd;
 mod testing;
 pub mod time;
 pub mod trajectory;
+pub mod ui;
 pub mod warp;
 
 pub use color::ColorPlane;
@@ -50,3 +51,4 @@ pub use phase::Phase;
 pub use plane::{Plane, Rect};
 pub use simd::Simd;
 pub use time::{MonoSpan, MonoTime};
+pub use ui::UiInput;

@@ -5,10 +5,12 @@
 use rayon::ThreadPool;
 use zerocopy::{FromBytes, IntoBytes};
 
+use super::error::{DecodeError, PlaneName};
 use super::geometry::CheckedPlane;
 use crate::bands::for_each_row;
 use crate::color::{ColorPlane, OrderedRgba16, Rgb10a2, Rgba8, Texel, half_to_ordered};
-use crate::format::{StreamFormat, ValidRectUse};
+use crate::format::{ColorFormat, StreamFormat, ValidRectUse};
+use crate::key::PlaneInput;
 use crate::plane::{Plane, Rect};
 use crate::warp::sample::sample;
 
@@ -38,15 +40,7 @@ pub(super) fn decode_color(
     let stretch = plane.valid != image;
     let target = if stretch { &mut *whole } else { &mut *color };
     target.reset(format.color, format.width, format.height);
-    match target {
-        ColorPlane::Rgba8(target) => {
-            read_words(pool, plane, target, |Rgba8(word)| Rgba8(u32::from_le(word)));
-        }
-        ColorPlane::Rgb10a2(target) => {
-            read_words(pool, plane, target, |Rgb10a2(word)| Rgb10a2(u32::from_le(word)));
-        }
-        ColorPlane::Rgba16f(target) => read_halves(pool, plane, target),
-    }
+    read_color(pool, plane, target);
     if !stretch {
         return image;
     }
@@ -62,6 +56,35 @@ pub(super) fn decode_color(
         _ => unreachable!("both were reset to the stream's format"),
     }
     image
+}
+
+/// Reads all of a UI plane with pixels of `format` into `ui`.
+///
+/// # Errors
+/// If its numbers do not describe pixels that are there. `ui` is then as it was.
+pub fn decode_ui(
+    pool: &ThreadPool,
+    format: ColorFormat,
+    plane: &PlaneInput<'_>,
+    ui: &mut ColorPlane,
+) -> Result<(), DecodeError> {
+    let plane = CheckedPlane::new(PlaneName::Ui, plane, format.bytes_per_pixel())?;
+    ui.reset(format, plane.width, plane.height);
+    read_color(pool, &plane, ui);
+    Ok(())
+}
+
+/// Reads all of a plane into `target`, which has its size and format.
+fn read_color(pool: &ThreadPool, plane: &CheckedPlane<'_>, target: &mut ColorPlane) {
+    match target {
+        ColorPlane::Rgba8(target) => {
+            read_words(pool, plane, target, |Rgba8(word)| Rgba8(u32::from_le(word)));
+        }
+        ColorPlane::Rgb10a2(target) => {
+            read_words(pool, plane, target, |Rgb10a2(word)| Rgb10a2(u32::from_le(word)));
+        }
+        ColorPlane::Rgba16f(target) => read_halves(pool, plane, target),
+    }
 }
 
 /// Reads a plane that is kept as it comes, but for the order of its bytes.

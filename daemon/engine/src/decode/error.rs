@@ -5,7 +5,7 @@ use std::fmt;
 use crate::plane::Rect;
 use crate::time::MonoTime;
 
-/// Names a plane of a key frame in a message.
+/// Names a plane in a message.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum PlaneName {
     /// Colour.
@@ -14,6 +14,10 @@ pub enum PlaneName {
     Depth,
     /// Motion.
     Motion,
+    /// User interface.
+    Ui,
+    /// Class of each pixel.
+    Mask,
 }
 
 impl fmt::Display for PlaneName {
@@ -22,6 +26,8 @@ impl fmt::Display for PlaneName {
             Self::Color => "colour",
             Self::Depth => "depth",
             Self::Motion => "motion",
+            Self::Ui => "UI",
+            Self::Mask => "mask",
         })
     }
 }

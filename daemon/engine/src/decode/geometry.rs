@@ -17,6 +17,7 @@ pub(super) struct CheckedPlane<'a> {
     stride: usize,
     bytes_per_pixel: usize,
     pub(super) width: u32,
+    pub(super) height: u32,
     pub(super) valid: Rect,
     pub(super) jitter: [f32; 2],
 }
@@ -53,6 +54,7 @@ impl<'a> CheckedPlane<'a> {
             stride: input.stride as usize,
             bytes_per_pixel: bytes_per_pixel as usize,
             width,
+            height,
             valid: input.valid,
             jitter: input.jitter,
         })

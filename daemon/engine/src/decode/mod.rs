@@ -21,6 +21,7 @@ mod motion_field;
 #[cfg(test)]
 mod tests;
 
+pub use color::decode_ui;
 pub use error::{DecodeError, PlaneName};
 pub use motion_field::{MotionField, decode_field};
 
