@@ -11,8 +11,8 @@ use foreframe_protocol::memory::ReadOnlyPool;
 use foreframe_protocol::socket::{Channel, Received, Sent};
 use foreframe_protocol::{
     Body, DaemonMessage, DestroyStream, EndReason, Error as ProtocolError, Goodbye, LateCamera,
-    OutputPool, OutputReleased, Packet, RegisterPool, Statistics, Submit, Subscribe, Unsubscribe,
-    Welcome,
+    OutputPool, OutputReleased, Packet, PlaneKind, RegisterPool, Statistics, Submit, Subscribe,
+    UiPlane, Unsubscribe, Welcome,
 };
 
 use crate::deadline::Deadline;
@@ -24,6 +24,7 @@ use crate::options::StreamOptions;
 use crate::outbox::Outbox;
 use crate::output::{MappedPool, OutputFrame, OutputSource};
 use crate::stream::{SlotLayout, Stream, StreamState};
+use crate::ui::UiFrame;
 
 /// Events that are kept for an application that does not look at them; older ones are lost first.
 const MAX_EVENTS: usize = 1024;
@@ -229,6 +230,54 @@ impl Client {
                 stream.skipped_keys += 1;
                 Err(Error::WouldBlock)
             }
+            Err(error) => self.fail(error.into()),
+        }
+    }
+
+    /// A free slot for a user interface between key frames, of a stream that declares UI planes, at
+    /// its largest size. The last free slot is left to key frames, so such a stream wants a slot more.
+    ///
+    /// # Errors
+    /// [`Error::WouldBlock`] if none is free, [`Error::NoPlane`] if the stream has no UI planes.
+    pub fn acquire_ui(&mut self, stream: StreamId) -> Result<UiFrame> {
+        self.connected()?;
+        let stream = open_stream(&mut self.streams, stream.0)?;
+        if stream.create.format.ui.is_none() {
+            return Err(Error::NoPlane { plane: PlaneKind::Ui });
+        }
+        stream.acquire_beside_keys().map(UiFrame::new).ok_or(Error::WouldBlock)
+    }
+
+    /// Shows a user interface from the next picture on, in the place of the one before.
+    ///
+    /// # Errors
+    /// [`Error::WouldBlock`] if the daemon has not read for a while: it is left out, and the slot is
+    /// free again. Other errors if it contradicts its stream; nothing is sent then.
+    pub fn submit_ui(&mut self, ui: UiFrame) -> Result<()> {
+        self.connected()?;
+        let (mut frame, plane, place) = ui.into_parts()?;
+        let stream = open_stream(&mut self.streams, frame.stream())?;
+        let ui_index = stream.next_ui;
+        let message =
+            UiPlane { stream: frame.stream(), slot: frame.slot(), ui_index, place, plane };
+        message.validate()?;
+        message.check(&stream.create, stream.layout.slot_bytes)?;
+        // What waits was posted earlier and may be what this depends on.
+        if let Err(error) = self.outbox.flush(&self.channel) {
+            return self.fail(error);
+        }
+        let sent = if self.outbox.is_waiting() {
+            Ok(Sent::WouldBlock)
+        } else {
+            self.channel.send(&Packet::new(&message), None)
+        };
+        match sent {
+            Ok(Sent::Whole) => {
+                stream.next_ui += 1;
+                stream.on_submitted(ui_index, &mut frame);
+                Ok(())
+            }
+            Ok(Sent::WouldBlock) => Err(Error::WouldBlock),
             Err(error) => self.fail(error.into()),
         }
     }

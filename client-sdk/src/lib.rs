@@ -42,6 +42,7 @@ mod options;
 mod outbox;
 mod output;
 mod stream;
+mod ui;
 
 pub use client::{Client, StreamId};
 pub use connect::{ConnectOptions, Connecting, Handshake};
@@ -58,3 +59,4 @@ pub use key::Key;
 pub use options::{Depth, Motion, StreamOptions};
 pub use output::{OutputFrame, OutputSource};
 pub use stream::StreamState;
+pub use ui::UiFrame;

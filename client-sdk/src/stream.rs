@@ -79,6 +79,8 @@ pub(crate) struct Stream {
     pub(crate) state: StreamState,
     pub(crate) order: KeyOrder,
     pub(crate) skipped_keys: u64,
+    /// `ui_index` of the next UI plane.
+    pub(crate) next_ui: u64,
     pub(crate) statistics: Option<Statistics>,
     pool: WritablePool,
     free: Vec<SlotMemory>,
@@ -99,6 +101,7 @@ impl Stream {
             state: StreamState::Pending,
             order: KeyOrder::default(),
             skipped_keys: 0,
+            next_ui: 0,
             statistics: None,
             pool,
             free,
@@ -110,6 +113,12 @@ impl Stream {
 
     pub(crate) fn pool(&self) -> &WritablePool {
         &self.pool
+    }
+
+    /// A free slot, unless it is the last one.
+    pub(crate) fn acquire_beside_keys(&mut self) -> Option<KeyFrame> {
+        self.free.extend(self.returned.try_iter());
+        if self.free.len() > 1 { self.acquire() } else { None }
     }
 
     /// A free slot as a key frame.

@@ -5,10 +5,11 @@
 //! ([`KeyOrder`]) and that the pixels are there in full ([`key_input`]).
 
 use foreframe_engine::{
-    self as engine, KeyInput, MonoTime, Pixels, PlaneInput, ReadPixels, format as convention,
+    self as engine, KeyInput, MonoTime, Pixels, PlaneInput, ReadPixels, UiInput,
+    format as convention,
 };
 use foreframe_protocol as protocol;
-use foreframe_protocol::{PlaneDescriptor, PlaneKind, Submit};
+use foreframe_protocol::{PlaneDescriptor, PlaneKind, Submit, UiPlane};
 
 /// A key frame that cannot be handed to the engine.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
@@ -75,7 +76,7 @@ impl IngestError {
     }
 }
 
-/// The engine's words for what a stream declares. User interface and mask planes are not used.
+/// The engine's words for what a stream declares. User interfaces have the format of colour.
 #[must_use]
 pub fn stream_format(format: &protocol::StreamFormat) -> engine::StreamFormat {
     engine::StreamFormat {
@@ -214,6 +215,48 @@ pub fn key_input<'a>(
         camera: submit.camera.map(camera),
         motion_from_camera: submit.motion_from_camera.map(camera),
     })
+}
+
+/// The user interface that came with a key frame, as the engine takes it; None if none did. `source`
+/// gives the pixels of a plane.
+///
+/// # Errors
+/// As [`key_input`].
+pub fn ui_of_key<'a>(
+    format: &protocol::StreamFormat,
+    submit: &Submit,
+    source: impl Fn(PlaneKind) -> Option<PlaneSource<'a>>,
+) -> Result<Option<UiInput<'a>>, IngestError> {
+    let Some(descriptor) = submit.planes.get(PlaneKind::Ui) else { return Ok(None) };
+    let source = source(PlaneKind::Ui).unwrap_or(PlaneSource::Packed(&[]));
+    ui_plane(format, descriptor, [0; 2], source).map(Some)
+}
+
+/// A user interface that came by itself, as the engine takes it.
+///
+/// # Errors
+/// As [`key_input`].
+pub fn ui_input<'a>(
+    format: &protocol::StreamFormat,
+    ui: &UiPlane,
+    source: PlaneSource<'a>,
+) -> Result<UiInput<'a>, IngestError> {
+    ui_plane(format, &ui.plane, ui.place, source)
+}
+
+fn ui_plane<'a>(
+    format: &protocol::StreamFormat,
+    descriptor: &PlaneDescriptor,
+    place: [i32; 2],
+    source: PlaneSource<'a>,
+) -> Result<UiInput<'a>, IngestError> {
+    if format.ui != Some(format.color) {
+        let expected = "UI planes with the format of colour";
+        return Err(IngestError::Planes { expected, found: "none, or others" });
+    }
+    let bytes_per_pixel = format.color.bytes_per_pixel();
+    let plane = plane_input(PlaneKind::Ui, descriptor, bytes_per_pixel, source)?;
+    Ok(UiInput { plane, place })
 }
 
 fn plane_input<'a>(

@@ -63,7 +63,7 @@ pub enum Error {
         /// State that it is in.
         found: String,
     },
-    /// A key frame that is not newer than the one before it.
+    /// A key frame or UI plane that is not newer than the one before it.
     #[error("submit, field {field}: expected more than {last}, found {found}")]
     Order {
         /// The field.

@@ -46,3 +46,4 @@ pub use wire::reject::{Reject, RejectCode};
 pub use wire::session::{EndReason, Goodbye};
 pub use wire::stream::{CreateStream, DestroyStream, StreamCreated, StreamEnded};
 pub use wire::submit::{ReleaseReason, SlotReleased, Submit};
+pub use wire::ui::UiPlane;

@@ -19,6 +19,7 @@ use crate::wire::reject::Reject;
 use crate::wire::session::Goodbye;
 use crate::wire::stream::{CreateStream, DestroyStream, StreamCreated, StreamEnded};
 use crate::wire::submit::{SlotReleased, Submit};
+use crate::wire::ui::UiPlane;
 
 wire_struct! {
     /// Starts every packet. Never changes, in any version.
@@ -83,6 +84,8 @@ wire_enum! {
         Pacing = 37 "pacing",
         /// Daemon: size and rate that would look best.
         Hint = 38 "hint",
+        /// Client: a user interface, between key frames.
+        UiPlane = 39 "ui_plane",
         /// Client: wants the output frames.
         Subscribe = 48 "subscribe",
         /// Client: wants no more output frames.
@@ -306,6 +309,7 @@ message_enum! {
         DestroyStream(DestroyStream),
         Submit(Submit),
         LateCamera(LateCamera),
+        UiPlane(UiPlane),
         Subscribe(Subscribe),
         Unsubscribe(Unsubscribe),
         OutputReleased(OutputReleased),

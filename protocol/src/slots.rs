@@ -7,27 +7,32 @@
 //! ```
 //!
 //! At most one slot of a stream is submitted, and at most one is latched, whenever a call returns:
-//! a newer key frame takes the place of one that was not latched yet.
+//! a newer key frame takes the place of one that was not latched yet. So it is with UI planes, which
+//! lie in slots of the same pool and are counted apart ([`Holds`]).
 
 use crate::error::{Error, Result};
 use crate::limits::MAX_SLOTS;
 use crate::wire::submit::Submit;
+use crate::wire::ui::UiPlane;
+
+/// What lies in a slot that the daemon has.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Holds {
+    /// A key frame.
+    Key,
+    /// A UI plane between key frames.
+    Ui,
+}
 
 /// Where a slot is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum SlotState {
     /// The client may write it.
     Client,
-    /// A key frame lies in it that the daemon has not begun to read.
-    Submitted {
-        /// The key frame.
-        key_index: u64,
-    },
-    /// The daemon copies its planes.
-    Latched {
-        /// The key frame.
-        key_index: u64,
-    },
+    /// Something lies in it that the daemon has not begun to read.
+    Submitted(Holds, u64),
+    /// The daemon copies it.
+    Latched(Holds, u64),
 }
 
 /// A slot that changed hands.
@@ -35,7 +40,7 @@ pub enum SlotState {
 pub struct SlotUse {
     /// The slot.
     pub slot: u32,
-    /// The key frame in it.
+    /// The key frame in it, or `ui_index` of the UI plane.
     pub key_index: u64,
 }
 
@@ -58,12 +63,12 @@ impl SlotTable {
         &self.states
     }
 
-    /// A key frame was submitted. Gives the older one that it supersedes, whose slot belongs to the
-    /// client again.
+    /// A key frame or a UI plane was submitted. Gives the older one that it supersedes, whose slot
+    /// belongs to the client again.
     ///
     /// # Errors
     /// [`Error::Slot`] if there is no such slot or it is not the client's. Nothing changes then.
-    pub fn submit(&mut self, slot: u32, key_index: u64) -> Result<Option<SlotUse>> {
+    pub fn submit(&mut self, holds: Holds, slot: u32, index: u64) -> Result<Option<SlotUse>> {
         match self.states.get(slot as usize) {
             Some(SlotState::Client) => {}
             Some(state) => {
@@ -75,45 +80,45 @@ impl SlotTable {
                 return Err(Error::Slot { slot, expected: "a slot of the pool", found });
             }
         }
-        let superseded = self.submitted();
+        let superseded = self.submitted(holds);
         if let Some(older) = superseded {
             self.states[older.slot as usize] = SlotState::Client;
         }
-        self.states[slot as usize] = SlotState::Submitted { key_index };
+        self.states[slot as usize] = SlotState::Submitted(holds, index);
         Ok(superseded)
     }
 
-    /// The newest key frame that waits.
+    /// The newest that waits.
     #[must_use]
-    pub fn submitted(&self) -> Option<SlotUse> {
+    pub fn submitted(&self, holds: Holds) -> Option<SlotUse> {
         self.find(|state| match state {
-            SlotState::Submitted { key_index } => Some(key_index),
+            SlotState::Submitted(what, index) => Some(index).filter(|_| what == holds),
             _ => None,
         })
     }
 
-    /// The key frame whose planes are being copied.
+    /// The one that is being copied.
     #[must_use]
-    pub fn latched(&self) -> Option<SlotUse> {
+    pub fn latched(&self, holds: Holds) -> Option<SlotUse> {
         self.find(|state| match state {
-            SlotState::Latched { key_index } => Some(key_index),
+            SlotState::Latched(what, index) => Some(index).filter(|_| what == holds),
             _ => None,
         })
     }
 
-    /// The daemon begins to read the newest key frame; None where none waits or one is being read.
-    pub fn latch(&mut self) -> Option<SlotUse> {
-        if self.latched().is_some() {
+    /// The daemon begins to read the newest; None where none waits or one is being read.
+    pub fn latch(&mut self, holds: Holds) -> Option<SlotUse> {
+        if self.latched(holds).is_some() {
             return None;
         }
-        let newest = self.submitted()?;
-        self.states[newest.slot as usize] = SlotState::Latched { key_index: newest.key_index };
+        let newest = self.submitted(holds)?;
+        self.states[newest.slot as usize] = SlotState::Latched(holds, newest.key_index);
         Some(newest)
     }
 
     /// The daemon has its copy: the slot belongs to the client again.
-    pub fn release_latched(&mut self) -> Option<SlotUse> {
-        let latched = self.latched()?;
+    pub fn release_latched(&mut self, holds: Holds) -> Option<SlotUse> {
+        let latched = self.latched(holds)?;
         self.states[latched.slot as usize] = SlotState::Client;
         Some(latched)
     }
@@ -151,5 +156,27 @@ impl KeyOrder {
         }
         self.last = Some((submit.key_index, submit.content_time_ns));
         Ok(())
+    }
+}
+
+/// Holds that indices of a stream's UI planes only increase.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct UiOrder {
+    last: Option<u64>,
+}
+
+impl UiOrder {
+    /// Takes note of the next UI plane.
+    ///
+    /// # Errors
+    /// [`Error::Order`] if its index is not above the last one's. Nothing changes then.
+    pub fn advance(&mut self, ui: &UiPlane) -> Result<()> {
+        match self.last.filter(|&last| ui.ui_index <= last) {
+            Some(last) => Err(Error::Order { field: "ui_index", last, found: ui.ui_index }),
+            None => {
+                self.last = Some(ui.ui_index);
+                Ok(())
+            }
+        }
     }
 }

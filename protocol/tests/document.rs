@@ -88,7 +88,7 @@ fn structs_have_no_gaps_and_every_number_is_aligned() {
             let element = field.type_name.trim_start_matches('[').split(';').next().unwrap();
             let align = match element {
                 "U16" => 2,
-                "U32" | "F32" => 4,
+                "U32" | "I32" | "F32" => 4,
                 "U64" | "I64" => 8,
                 _ => 1,
             };

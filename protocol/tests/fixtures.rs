@@ -68,6 +68,9 @@ fn patched(sample: &str, path: &str, bytes: &[u8]) -> Vec<u8> {
     let body = body_name(*kind);
     let offset = match path.split_once('.') {
         None => field(&body, path).0,
+        Some(("plane", inner)) if kind == &MessageKind::UiPlane => {
+            field(&body, "plane").0 + field("PlaneRaw", inner).0
+        }
         Some(("plane", inner)) => field(&body, "planes").0 + 48 + field("PlaneRaw", inner).0,
         Some(("gpu_pci", inner)) => field(&body, "gpu_pci").0 + field("PciAddressRaw", inner).0,
         Some((outer, _)) => panic!("no nested {outer}"),
@@ -167,6 +170,16 @@ fn bad_fields() -> Vec<(&'static str, &'static str, &'static str, Vec<u8>)> {
         ("late_camera", "stream", "0", u32(0)),
         ("late_camera", "content_time_ns", "2_to_63", u64(1 << 63)),
         ("late_camera", "view", "nan", f32(f32::NAN)),
+        ("ui_plane", "stream", "0", u32(0)),
+        ("ui_plane", "slot", "8", u32(8)),
+        ("ui_plane", "x", "8193", u32(8193)),
+        ("ui_plane", "y", "lowest", u32(0x8000_0000)),
+        ("ui_plane", "reserved", "1", u64(1)),
+        ("ui_plane", "plane.width", "0", u32(0)),
+        ("ui_plane", "plane.offset", "unaligned", u64(8)),
+        ("ui_plane", "plane.stride", "huge", u32(u32::MAX)),
+        ("ui_plane", "plane.valid_x", "outside", u32(21)),
+        ("ui_plane", "plane.jitter", "some", f32(0.5)),
         ("subscribe", "slots", "0", u32(0)),
         ("subscribe", "slots", "9", u32(9)),
         ("output_released", "slot", "8", u32(8)),

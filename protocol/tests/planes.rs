@@ -2,9 +2,9 @@
 
 mod samples;
 
-use foreframe_protocol::slots::{KeyOrder, SlotState, SlotTable, SlotUse};
-use foreframe_protocol::{Error, PlaneDescriptor, PlaneKind, Rect, Submit};
-use samples::{SLOT_BYTES, output_pool, stream, submit};
+use foreframe_protocol::slots::{Holds, KeyOrder, SlotState, SlotTable, SlotUse, UiOrder};
+use foreframe_protocol::{Error, PlaneDescriptor, PlaneKind, PlaneSize, Rect, Submit, UiPlane};
+use samples::{SLOT_BYTES, output_pool, stream, submit, ui_plane};
 
 fn check(submit: &Submit) -> Result<(), String> {
     submit.check(&stream(), SLOT_BYTES).map_err(|error| error.to_string())
@@ -107,27 +107,70 @@ fn indices_and_content_times_only_increase() {
 #[test]
 fn newest_key_frame_wins_until_it_is_latched() {
     let mut slots = SlotTable::new(3);
-    assert_eq!(slots.submit(0, 10).unwrap(), None);
-    assert_eq!(slots.submit(1, 11).unwrap(), Some(SlotUse { slot: 0, key_index: 10 }));
-    assert_eq!(slots.latch(), Some(SlotUse { slot: 1, key_index: 11 }));
+    assert_eq!(slots.submit(Holds::Key, 0, 10).unwrap(), None);
+    assert_eq!(slots.submit(Holds::Key, 1, 11).unwrap(), Some(SlotUse { slot: 0, key_index: 10 }));
+    assert_eq!(slots.latch(Holds::Key), Some(SlotUse { slot: 1, key_index: 11 }));
     // A latched one is not superseded, and only one is latched at a time.
-    assert_eq!(slots.submit(0, 12).unwrap(), None);
-    assert_eq!(slots.latch(), None);
-    assert_eq!(slots.release_latched(), Some(SlotUse { slot: 1, key_index: 11 }));
-    assert_eq!(slots.release_latched(), None);
-    assert_eq!(slots.latch(), Some(SlotUse { slot: 0, key_index: 12 }));
+    assert_eq!(slots.submit(Holds::Key, 0, 12).unwrap(), None);
+    assert_eq!(slots.latch(Holds::Key), None);
+    assert_eq!(slots.release_latched(Holds::Key), Some(SlotUse { slot: 1, key_index: 11 }));
+    assert_eq!(slots.release_latched(Holds::Key), None);
+    assert_eq!(slots.latch(Holds::Key), Some(SlotUse { slot: 0, key_index: 12 }));
 }
 
 #[test]
 fn a_slot_that_the_daemon_has_cannot_be_submitted_again() {
     let mut slots = SlotTable::new(2);
-    slots.submit(0, 1).unwrap();
-    assert!(matches!(slots.submit(0, 2), Err(Error::Slot { slot: 0, .. })));
-    assert_eq!(slots.states()[0], SlotState::Submitted { key_index: 1 }, "nothing has changed");
-    slots.latch();
-    assert!(matches!(slots.submit(0, 2), Err(Error::Slot { slot: 0, .. })));
-    assert!(matches!(slots.submit(2, 2), Err(Error::Slot { slot: 2, .. })));
-    assert!(matches!(slots.submit(u32::MAX, 2), Err(Error::Slot { .. })));
+    slots.submit(Holds::Key, 0, 1).unwrap();
+    assert!(matches!(slots.submit(Holds::Key, 0, 2), Err(Error::Slot { slot: 0, .. })));
+    assert_eq!(slots.states()[0], SlotState::Submitted(Holds::Key, 1), "nothing has changed");
+    slots.latch(Holds::Key);
+    assert!(matches!(slots.submit(Holds::Key, 0, 2), Err(Error::Slot { slot: 0, .. })));
+    assert!(matches!(slots.submit(Holds::Key, 2, 2), Err(Error::Slot { slot: 2, .. })));
+    assert!(matches!(slots.submit(Holds::Key, u32::MAX, 2), Err(Error::Slot { .. })));
+}
+
+#[test]
+fn ui_planes_wait_beside_key_frames_in_slots_of_the_same_pool() {
+    let mut slots = SlotTable::new(3);
+    slots.submit(Holds::Key, 0, 10).unwrap();
+    assert_eq!(slots.submit(Holds::Ui, 1, 5).unwrap(), None, "a key is not superseded by it");
+    assert!(slots.submit(Holds::Ui, 0, 6).is_err(), "a key frame lies there");
+    let older = slots.submit(Holds::Ui, 2, 6).unwrap();
+    assert_eq!(older, Some(SlotUse { slot: 1, key_index: 5 }));
+    assert_eq!(slots.latch(Holds::Ui), Some(SlotUse { slot: 2, key_index: 6 }));
+    assert_eq!(slots.latch(Holds::Key), Some(SlotUse { slot: 0, key_index: 10 }));
+    assert_eq!(slots.release_latched(Holds::Ui), Some(SlotUse { slot: 2, key_index: 6 }));
+    assert_eq!(slots.release_latched(Holds::Ui), None);
+    assert_eq!(slots.latched(Holds::Key), Some(SlotUse { slot: 0, key_index: 10 }));
+}
+
+#[test]
+fn a_ui_plane_fits_what_its_stream_declares_and_its_slot() {
+    let (ui, mut stream) = (ui_plane(), stream());
+    ui.check(&stream, SLOT_BYTES).unwrap();
+    let end = ui.plane.offset + ui.plane.byte_len(4);
+    assert!(ui.check(&stream, end).is_ok());
+    let error = ui.check(&stream, end - 1).unwrap_err();
+    assert!(matches!(error, Error::Plane { plane: PlaneKind::Ui, field: "end", .. }), "{error}");
+    assert!(UiPlane { slot: stream.slots, ..ui }.check(&stream, SLOT_BYTES).is_err());
+    let small = PlaneSize { width: 319, height: 64 };
+    stream.max_sizes.set(PlaneKind::Ui, Some(small));
+    assert!(ui.check(&stream, SLOT_BYTES).is_err(), "larger than declared");
+    stream.format.ui = None;
+    stream.max_sizes.set(PlaneKind::Ui, None);
+    let error = ui.check(&stream, SLOT_BYTES).unwrap_err().to_string();
+    assert!(error.contains("a stream that declares UI planes"), "{error}");
+}
+
+#[test]
+fn indices_of_ui_planes_only_increase() {
+    let mut order = UiOrder::default();
+    order.advance(&UiPlane { ui_index: 4, ..ui_plane() }).unwrap();
+    for bad in [4, 3, 0] {
+        assert!(order.advance(&UiPlane { ui_index: bad, ..ui_plane() }).is_err(), "{bad}");
+    }
+    order.advance(&UiPlane { ui_index: 5, ..ui_plane() }).unwrap();
 }
 
 #[test]

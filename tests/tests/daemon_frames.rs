@@ -2,8 +2,11 @@
 
 mod daemon_fixture;
 
-use daemon_fixture::RunningDaemon;
-use foreframe_protocol::{DaemonMessage, DestroyStream, LateCamera, OutputKind, OutputReleased};
+use daemon_fixture::{Client, KeySource, RunningDaemon, Screen};
+use foreframe_protocol::{
+    ColorFormat, DaemonMessage, DestroyStream, ErrorCode, LateCamera, OutputKind, OutputReleased,
+    PlaneDescriptor, PlaneKind, PlaneSize, ReleaseReason, StreamFormat, UiPlane,
+};
 
 const RED: [u8; 4] = [255, 0, 0, 255];
 const GREEN: [u8; 4] = [0, 255, 0, 255];
@@ -208,4 +211,118 @@ fn a_recording_holds_the_poses_that_led_pictures() {
     assert_eq!((found.pose.content_time_ns, found.pose.view), (content_time_ns, view));
     let arrivals: Vec<_> = capture.times().map(|times| times.arrived_at_ns).collect();
     assert!((arrivals[0]..=arrivals[1]).contains(&found.arrived_at_ns), "{arrivals:?}");
+}
+
+/// Sends a UI plane of one colour, 3x2 at column 4 and row 1, from a slot that no key uses now.
+fn submit_ui(
+    client: &mut Client,
+    source: &mut KeySource,
+    ui_index: u64,
+    color: [u8; 4],
+) -> UiPlane {
+    let place = source.layout().get(PlaneKind::Ui).unwrap().offset;
+    let plane = PlaneDescriptor::packed(place, PlaneSize { width: 3, height: 2 }, 4);
+    let slot = source.slots.len() - 1;
+    let pixels = &mut source.slots[slot][place as usize..][..plane.byte_len(4) as usize];
+    pixels.chunks_exact_mut(4).for_each(|pixel| pixel.copy_from_slice(&color));
+    let ui = UiPlane { stream: 1, slot: slot as u32, ui_index, place: [4, 1], plane };
+    client.send(ui);
+    let reason = client.expect("its slot back", |message| match message {
+        DaemonMessage::SlotReleased(it) => (it.slot == ui.slot).then_some(it.reason),
+        _ => None,
+    });
+    assert_eq!(reason, ReleaseReason::Copied);
+    ui
+}
+
+/// The first frame with this pixel at column 5 of row 2.
+fn expect_pixel(client: &mut Client, screen: &Screen, color: [u8; 4]) -> Vec<u8> {
+    loop {
+        let frame = client.expect_frame(screen);
+        let pixels = screen.pixels(&frame);
+        client.send(OutputReleased { pool: frame.pool, slot: frame.slot });
+        if pixels[4 * (2 * 8 + 5)..][..4] == color {
+            return pixels;
+        }
+    }
+}
+
+fn with_ui() -> StreamFormat {
+    StreamFormat { ui: Some(ColorFormat::Rgba8), ..StreamFormat::rgba8(8, 8) }
+}
+
+#[test]
+fn a_user_interface_changes_without_a_key_and_lies_over_the_next_one_too() {
+    let args = foreframed::Args { record: Some("a.mcap".into()), ..Default::default() };
+    let mut daemon = RunningDaemon::start_with("shm", args);
+    let mut client = daemon.connect();
+    let mut source = client.open_stream_of(1, with_ui());
+    let screen = client.subscribe(1, 3);
+    // Its own UI plane is all zero: clear.
+    client.submit(&mut source, RED);
+    expect_pixel(&mut client, &screen, RED);
+    let first = submit_ui(&mut client, &mut source, 1, [0, 0, 200, 255]);
+    let shown = expect_pixel(&mut client, &screen, [0, 0, 200, 255]);
+    for (i, pixel) in shown.chunks(4).enumerate() {
+        let is_covered = (4..7).contains(&(i % 8)) && (1..3).contains(&(i / 8));
+        assert_eq!(pixel, if is_covered { [0, 0, 200, 255] } else { RED }, "pixel {i}");
+    }
+    // 100 of 255 parts of blue over red.
+    submit_ui(&mut client, &mut source, 2, [0, 0, 100, 100]);
+    expect_pixel(&mut client, &screen, [155, 0, 100, 255]);
+    // The next key brings a clear one.
+    client.submit(&mut source, GREEN);
+    expect_pixel(&mut client, &screen, GREEN);
+    daemon.stop();
+    let capture = foreframed::capture::Capture::open(&daemon.path("a.mcap")).unwrap();
+    let recorded: Vec<_> = capture.ui_planes().copied().collect();
+    assert_eq!(recorded.len(), 2);
+    assert_eq!((recorded[0].ui.place, recorded[0].ui.ui_index), ([4, 1], first.ui_index));
+    assert_eq!(capture.ui_pixels(1).unwrap().bytes, [0, 0, 100, 100].repeat(6));
+    let arrivals: Vec<_> = capture.times().map(|times| times.arrived_at_ns).collect();
+    assert!(recorded.iter().all(|ui| (arrivals[0]..=arrivals[1]).contains(&ui.arrived_at_ns)));
+}
+
+#[test]
+fn a_ui_plane_that_does_not_fit_costs_itself_and_one_of_another_format_its_stream() {
+    let daemon = RunningDaemon::start("shm");
+    let mut client = daemon.connect();
+    let mut source = client.open_stream_of(1, with_ui());
+    let screen = client.subscribe(1, 3);
+    client.submit(&mut source, RED);
+    let mut large = submit_ui(&mut client, &mut source, 1, [9, 9, 9, 255]);
+    large.ui_index = 2;
+    large.plane.offset = 1 << 20;
+    client.send(large);
+    let reason = client.expect("a refusal", |message| match message {
+        DaemonMessage::SlotReleased(it) => (it.key_index == 2).then_some(it.reason),
+        _ => None,
+    });
+    assert_eq!(reason, ReleaseReason::Refused);
+    let error = client.expect_error();
+    assert!(error.code == ErrorCode::Plane && !error.is_fatal, "{error:?}");
+    submit_ui(&mut client, &mut source, 3, [7, 7, 7, 255]);
+    expect_pixel(&mut client, &screen, [7, 7, 7, 255]);
+
+    let format = StreamFormat { ui: Some(ColorFormat::Rgba16f), ..StreamFormat::rgba8(8, 8) };
+    let create = foreframe_protocol::CreateStream {
+        stream: 2,
+        format,
+        max_sizes: format.full_sizes(),
+        slots: 3,
+    };
+    client.send(create);
+    let error = client.expect_error();
+    assert!(error.code == ErrorCode::Unsupported && !error.is_fatal, "{error:?}");
+    assert_eq!(
+        (error.expected.as_str(), error.found.as_str()),
+        ("rgba8, as colour has", "rgba16f")
+    );
+    let last = submit_ui(&mut client, &mut source, 4, [6, 6, 6, 255]);
+    // An index that was used is not what a client sends that keeps to the protocol.
+    client.send(UiPlane { slot: 0, ..last });
+    let said = client.read_to_end();
+    let is_fatal =
+        |message: &DaemonMessage| matches!(message, DaemonMessage::Error(it) if it.is_fatal);
+    assert!(said.iter().any(is_fatal), "{said:?}");
 }

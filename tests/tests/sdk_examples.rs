@@ -73,9 +73,14 @@ fn ended(name: &str, child: Child) -> String {
 #[test]
 fn the_applications_run_to_their_end_and_nothing_is_refused() {
     let daemon = DefaultDaemon::start();
-    let names = ["sdk_01_color_only", "sdk_02_depth_and_motion", "sdk_03_dynamic_resolution"];
+    let names = [
+        "sdk_01_color_only",
+        "sdk_02_depth_and_motion",
+        "sdk_03_dynamic_resolution",
+        "sdk_06_user_interface",
+    ];
     let children = names.map(|name| (name, daemon.run(name)));
-    let [first, second, _] = children.map(|(name, child)| ended(name, child));
+    let [first, second, ..] = children.map(|(name, child)| ended(name, child));
     assert!(first.contains("in-between frames are made by"), "{first}");
     assert!(first.contains("key frames were skipped"), "{first}");
     assert!(second.contains("keys_refused: 0"), "{second}");

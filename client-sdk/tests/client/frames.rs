@@ -5,7 +5,7 @@ use foreframe_client::{
     ColorFormat, Depth, DepthFormat, DepthMeaning, Error, Key, Motion, MotionFormat, MotionUnit,
     PlaneKind, Rect, StreamOptions,
 };
-use foreframe_protocol::{ClientMessage, PlaneSize};
+use foreframe_protocol::{ClientMessage, PlaneSize, ReleaseReason, SlotReleased, UiPlane};
 
 /// Colour, depth 1.5 times smaller, motion 4 times smaller, UI of its own size, mask.
 fn options() -> StreamOptions {
@@ -136,4 +136,48 @@ fn streams_that_contradict_themselves_or_the_daemon_are_refused_here() {
     }
     let fifth = client.create_stream(&StreamOptions::rgba8(8, 8));
     assert!(matches!(fifth, Err(Error::Option { option: "streams", .. })), "{fifth:?}");
+}
+
+#[test]
+fn a_user_interface_goes_by_itself_where_it_is_placed_and_leaves_a_slot_to_keys() {
+    let (mut client, mut daemon) = connect();
+    let stream = daemon.accept_stream(&mut client, &options());
+    let mut sent = Vec::new();
+    for number in 0..2_u8 {
+        let mut ui = client.acquire_ui(stream).unwrap();
+        ui.resize(PlaneSize { width: 20, height: 10 }).unwrap();
+        ui.set_place(-3, i32::from(number));
+        let mut pixels = ui.pixels_mut();
+        for y in 0..10 {
+            pixels.row_mut(y).fill(200 + number);
+        }
+        client.submit_ui(ui).unwrap();
+        let Some(ClientMessage::UiPlane(ui)) = daemon.next() else { panic!("a UI plane") };
+        assert_eq!((ui.ui_index, ui.place), (u64::from(number), [-3, i32::from(number)]));
+        assert_eq!((ui.plane.width, ui.plane.height, ui.plane.stride), (20, 10, 128));
+        let (pool, slot_bytes) =
+            (daemon.pool.as_ref().unwrap(), daemon.stream.unwrap().1.slot_bytes);
+        let offset = u64::from(ui.slot) * slot_bytes + ui.plane.offset;
+        let mut pixels = Vec::new();
+        pool.copy_rows_to_vec(offset, ui.plane.stride, 80, 10, &mut pixels).unwrap();
+        assert!(pixels.iter().all(|&byte| byte == 200 + number));
+        sent.push(ui);
+    }
+    assert!(matches!(client.acquire_ui(stream), Err(Error::WouldBlock)), "the last one is a key's");
+    let key = client.acquire(stream).unwrap();
+    drop(key);
+    let UiPlane { stream: number, slot, ui_index: key_index, .. } = sent[0];
+    let reason = ReleaseReason::Superseded;
+    daemon.send(&SlotReleased { stream: number, slot, key_index, reason });
+    client.dispatch().unwrap();
+    client.acquire_ui(stream).expect("its slot is free again");
+}
+
+#[test]
+fn a_stream_without_ui_planes_has_none_to_acquire() {
+    let (mut client, mut daemon) = connect();
+    let stream = daemon.accept_stream(&mut client, &StreamOptions::rgba8(8, 8));
+    let error = client.acquire_ui(stream).unwrap_err();
+    assert!(matches!(error, Error::NoPlane { plane: PlaneKind::Ui }), "{error}");
+    assert!(daemon.next().is_none());
 }

@@ -2,11 +2,12 @@
 //!
 //! Chunks are uncompressed, carry a CRC, are built in memory and written once, and the file is
 //! flushed after each, so a crash costs at most the chunk that was being written. What the bytes
-//! of stream, submit and late-camera messages mean is the business of [`super::writer`].
+//! of stream, submit, late-camera and UI messages mean is the business of [`super::writer`].
 
 use std::collections::BTreeMap;
 use std::io::Write;
 
+use foreframe_protocol::UiPlane;
 use mcap::WriteOptions;
 use mcap::records::MessageHeader;
 use mcap::write::NoSeek;
@@ -16,6 +17,7 @@ use super::error::CaptureError;
 use super::record::{self, BadRecord, FrameRecord, MAX_PLANES, MAX_RECORD, PlaneEntry, PlaneInfo};
 use super::schema::{self, Topic};
 use super::session::{Gap, SessionInfo};
+use super::ui_plane;
 
 /// One plane to record.
 #[derive(Clone, Copy, Debug)]
@@ -141,6 +143,39 @@ impl<W: Write> Container<W> {
         Ok(self.mcap.flush()?)
     }
 
+    /// Writes a UI plane as one chunk. Returns the stored bytes.
+    pub(super) fn ui_plane(
+        &mut self,
+        stream: u32,
+        stamp: Stamp,
+        ui: &UiPlane,
+        plane: &PlaneBytes<'_>,
+        coding: Coding,
+    ) -> Result<u64, CaptureError> {
+        let checked = plane.check().and_then(|()| ui_plane::check_ui(ui, &plane.info));
+        checked.map_err(|bad| unrecordable("a UI plane", bad))?;
+        let (entry, stored) = self.encode(plane, coding)?;
+        let message = ui_plane::message(stamp.log_time, ui, entry, &stored);
+        self.message(Topic::UiPlane(stream), stamp, &message)?;
+        self.mcap.flush()?;
+        Ok(entry.stored_len)
+    }
+
+    /// A plane as it is stored, and its entry.
+    fn encode(
+        &mut self,
+        plane: &PlaneBytes<'_>,
+        coding: Coding,
+    ) -> Result<(PlaneEntry, Vec<u8>), CaptureError> {
+        let raw = plane.tight_bytes(&mut self.tight);
+        let (stored, coding) = self
+            .encoder
+            .encode(raw, plane.info.layout, coding)
+            .map_err(|source| CaptureError::Io { doing: "compressing a plane", source })?;
+        let (stored_len, hash) = (stored.len() as u64, plane_hash(raw));
+        Ok((PlaneEntry { info: plane.info, coding, stored_len, hash }, stored.to_vec()))
+    }
+
     /// Writes one frame as one chunk. `stamp.log_time` is its arrival. Returns the stored bytes.
     pub(super) fn frame(
         &mut self,
@@ -156,14 +191,9 @@ impl<W: Write> Container<W> {
         let mut entries = Vec::with_capacity(planes.len());
         let mut stored_planes = Vec::with_capacity(planes.len());
         for plane in planes {
-            let raw = plane.tight_bytes(&mut self.tight);
-            let (stored, coding) = self
-                .encoder
-                .encode(raw, plane.info.layout, coding)
-                .map_err(|source| CaptureError::Io { doing: "compressing a plane", source })?;
-            let (stored_len, hash) = (stored.len() as u64, plane_hash(raw));
-            entries.push(PlaneEntry { info: plane.info, coding, stored_len, hash });
-            stored_planes.push(stored.to_vec());
+            let (entry, stored) = self.encode(plane, coding)?;
+            entries.push(entry);
+            stored_planes.push(stored);
         }
         let record = FrameRecord {
             arrived_at_ns: stamp.log_time,

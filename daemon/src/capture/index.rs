@@ -19,6 +19,7 @@ use super::record::PlaneEntry;
 use super::schema;
 use super::session::{Gap, SessionInfo};
 use super::source::{ReadAt, Window};
+use super::ui_plane::UiEntry;
 use super::walk::{Stop, Walk};
 
 /// Where and why a capture ends early, or a chunk could not be used.
@@ -111,6 +112,7 @@ pub(super) struct Index {
     pub(super) streams: Vec<StreamEntry>,
     pub(super) frames: Vec<FrameEntry>,
     pub(super) late_cameras: Vec<CapturedPose>,
+    pub(super) ui_planes: Vec<UiEntry>,
     pub(super) gaps: Vec<Gap>,
     pub(super) planes: PlaneMap<PlaneStatistics>,
     pub(super) size: u64,

@@ -60,6 +60,8 @@ pub struct StreamInfo {
     pub frames: usize,
     /// Poses that arrived after a key frame.
     pub late_cameras: usize,
+    /// UI planes that arrived between key frames.
+    pub ui_planes: usize,
 }
 
 impl CaptureInfo {
@@ -102,6 +104,11 @@ impl CaptureInfo {
                         .late_cameras
                         .iter()
                         .filter(|pose| pose.stream == position)
+                        .count(),
+                    ui_planes: index
+                        .ui_planes
+                        .iter()
+                        .filter(|ui| ui.captured.stream == position)
                         .count(),
                 })
                 .collect(),

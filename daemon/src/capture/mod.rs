@@ -24,6 +24,7 @@ mod session;
 mod source;
 #[cfg(test)]
 mod tests;
+mod ui_plane;
 mod walk;
 mod writer;
 
@@ -39,4 +40,5 @@ pub use record::PlaneInfo;
 pub use schema::VERSION;
 pub use session::{CaptureSource, DISPLAY_ORIGIN, Gap, PIXELS_PER_DEGREE, SessionInfo};
 pub use source::ReadAt;
+pub use ui_plane::CapturedUi;
 pub use writer::CaptureWriter;

@@ -13,9 +13,11 @@ use super::codec;
 use super::error::CaptureError;
 use super::index::{CapturedPose, FrameEntry, Index, Span};
 use super::info::CaptureInfo;
+use super::layout::pixel_layout;
 use super::record::{BadRecord, FrameRecord, PlaneEntry, PlaneInfo};
 use super::session::{Gap, SessionInfo};
 use super::source::ReadAt;
+use super::ui_plane::CapturedUi;
 use super::writer::check_planes;
 
 /// An open capture.
@@ -156,6 +158,29 @@ impl<S: ReadAt> Capture<S> {
     #[must_use]
     pub fn late_cameras(&self) -> &[CapturedPose] {
         &self.index.late_cameras
+    }
+
+    /// UI planes that arrived between key frames and were shown, in the order of the file.
+    pub fn ui_planes(&self) -> impl ExactSizeIterator<Item = &CapturedUi> + '_ {
+        self.index.ui_planes.iter().map(|entry| &entry.captured)
+    }
+
+    /// The pixels of one of [`Capture::ui_planes`].
+    ///
+    /// # Errors
+    /// If there is no such plane, or it is not what was recorded.
+    pub fn ui_pixels(&self, number: usize) -> Result<CapturedPlane, CaptureError> {
+        let Some(ui) = self.index.ui_planes.get(number) else {
+            let frames = self.index.ui_planes.len();
+            return Err(CaptureError::NoSuchFrame { frames, found: number });
+        };
+        let layout = pixel_layout(self.format(ui.captured.stream), PlaneKind::Ui);
+        if layout != Some(ui.entry.info.layout) {
+            let expected = layout.map_or("no ui plane".to_owned(), |layout| layout.to_string());
+            let bad = BadRecord::new(expected, ui.entry.info.layout);
+            return Err(damaged("a ui plane", ui.stored, bad));
+        }
+        self.plane(number, &ui.entry, ui.stored)
     }
 
     /// Frames that arrived and were not recorded.

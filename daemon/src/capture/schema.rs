@@ -55,6 +55,12 @@ pub(super) const LATE_CAMERA: Schema = Schema {
     text: include_str!("schemas/late_camera.txt"),
     message_encoding: "foreframe",
 };
+pub(super) const UI_PLANE: Schema = Schema {
+    name: "foreframe.UiPlane",
+    encoding: "text",
+    text: include_str!("schemas/ui_plane.txt"),
+    message_encoding: "foreframe",
+};
 pub(super) const PLANE: Schema = Schema {
     name: "foreframe.Plane",
     encoding: "text",
@@ -70,6 +76,7 @@ pub(super) enum Topic {
     Stream(u32),
     Frame(u32),
     LateCamera(u32),
+    UiPlane(u32),
     /// Stream, kind, and which one of its kind in the frame, from 0.
     Plane(u32, PlaneKind, u8),
 }
@@ -83,6 +90,7 @@ impl Topic {
             Self::Stream(stream) => format!("/stream/{stream}/create"),
             Self::Frame(stream) => format!("/stream/{stream}/submit"),
             Self::LateCamera(stream) => format!("/stream/{stream}/late_camera"),
+            Self::UiPlane(stream) => format!("/stream/{stream}/ui_plane"),
             Self::Plane(stream, kind, 0) => format!("/stream/{stream}/{}", kind.name()),
             Self::Plane(stream, kind, which) => format!("/stream/{stream}/{}/{which}", kind.name()),
         }
@@ -103,6 +111,7 @@ impl Topic {
             ("create", None) => Self::Stream(stream),
             ("submit", None) => Self::Frame(stream),
             ("late_camera", None) => Self::LateCamera(stream),
+            ("ui_plane", None) => Self::UiPlane(stream),
             (kind, which) => {
                 Self::Plane(stream, plane_kind(kind)?, which.unwrap_or("0").parse().ok()?)
             }
@@ -117,6 +126,7 @@ impl Topic {
             Self::Stream(_) => &STREAM,
             Self::Frame(_) => &FRAME,
             Self::LateCamera(_) => &LATE_CAMERA,
+            Self::UiPlane(_) => &UI_PLANE,
             Self::Plane(..) => &PLANE,
         }
     }
@@ -138,6 +148,7 @@ mod tests {
             Topic::Stream(7),
             Topic::Frame(7),
             Topic::LateCamera(7),
+            Topic::UiPlane(7),
         ];
         for &kind in PlaneKind::ALL {
             topics.extend([Topic::Plane(1, kind, 0), Topic::Plane(u32::MAX, kind, 3)]);

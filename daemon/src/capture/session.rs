@@ -70,7 +70,7 @@ fn protocol_version() -> String {
     format!("{}.{}", limits::MAJOR, limits::MINOR)
 }
 
-/// Key frames that arrived and were not recorded.
+/// Key frames, or UI planes between them, that arrived and were not recorded.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct Gap {
     /// Stream that lacks them.

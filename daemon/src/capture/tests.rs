@@ -12,6 +12,7 @@ use proptest::prelude::*;
 use super::*;
 
 mod late_camera;
+mod ui_plane;
 
 const WIDTH: u32 = 6;
 const HEIGHT: u32 = 4;

@@ -20,6 +20,7 @@ use super::record::{self, BadRecord, FrameRecord, MAX_RECORD, PlaneEntry};
 use super::schema::Topic;
 use super::session::{Gap, SessionInfo};
 use super::source::{ReadAt, Window};
+use super::ui_plane::{self, CapturedUi, UiEntry};
 
 /// Longest session, stream or gap message.
 const MAX_CONTROL: usize = 1024 * 1024;
@@ -66,6 +67,7 @@ pub(super) struct Walk<'a, S> {
     streams: Vec<StreamEntry>,
     frames: Vec<FrameEntry>,
     late_cameras: Vec<CapturedPose>,
+    ui_planes: Vec<UiEntry>,
     gaps: Vec<Gap>,
     planes: PlaneMap<PlaneStatistics>,
     pending: Option<Pending>,
@@ -84,6 +86,7 @@ impl<'a, S: ReadAt> Walk<'a, S> {
             streams: Vec::new(),
             frames: Vec::new(),
             late_cameras: Vec::new(),
+            ui_planes: Vec::new(),
             gaps: Vec::new(),
             planes: PlaneMap::default(),
             pending: None,
@@ -110,6 +113,7 @@ impl<'a, S: ReadAt> Walk<'a, S> {
             streams: self.streams,
             frames: self.frames,
             late_cameras: self.late_cameras,
+            ui_planes: self.ui_planes,
             gaps: self.gaps,
             planes: self.planes,
             size,
@@ -298,6 +302,7 @@ impl<'a, S: ReadAt> Walk<'a, S> {
                 self.check_crc(chunk)?;
                 self.late_camera(data, stream, time(6))
             }
+            Topic::UiPlane(stream) => self.ui_plane(data, stream, time(6)),
             Topic::Session | Topic::Gap | Topic::Stream(_) => {
                 self.check_crc(chunk)?;
                 self.control(data, topic)
@@ -352,6 +357,37 @@ impl<'a, S: ReadAt> Walk<'a, S> {
             Err(error) => return broken(data.at, "a late-camera body", error),
         }
         Ok(())
+    }
+
+    fn ui_plane(&mut self, data: Span, stream: u32, arrived_at_ns: u64) -> Result<(), Stop> {
+        let Some(index) = self.streams.iter().position(|entry| entry.id == stream) else {
+            return broken(data.at, "a stream that was described before", stream);
+        };
+        let room = data.len.saturating_sub(ui_plane::LENGTH_BYTES).min(MAX_RECORD as u64);
+        let length = self.window.array::<4>(data.at)?.map_or(0, u32::from_le_bytes);
+        let length = u64::from(length);
+        if length > room {
+            return broken(data.at, format!("a record of at most {room} bytes"), length);
+        }
+        let record = Span { at: data.at + ui_plane::LENGTH_BYTES, len: length };
+        let stored = Span { at: record.end(), len: data.end() - record.end() };
+        let bytes = self.window.bytes(record.at, small(record.len))?.unwrap_or_default();
+        match ui_plane::parse(bytes, stored.len, arrived_at_ns) {
+            Ok((ui, entry)) => {
+                let captured = CapturedUi { stream: index, arrived_at_ns, ui };
+                self.ui_planes.push(UiEntry { captured, entry, stored });
+                self.count_plane(&entry);
+                Ok(())
+            }
+            Err(BadRecord { expected, found }) => broken(data.at, expected, found),
+        }
+    }
+
+    fn count_plane(&mut self, plane: &PlaneEntry) {
+        let kind = plane.info.kind;
+        let mut statistics = self.planes.get(kind).cloned().unwrap_or_default();
+        statistics.count(plane);
+        self.planes.set(kind, Some(statistics));
     }
 
     fn frame(
@@ -413,12 +449,7 @@ impl<'a, S: ReadAt> Walk<'a, S> {
         if pending.entry.planes.len() == pending.expected.len()
             && let Some(whole) = self.pending.take()
         {
-            for plane in &whole.expected {
-                let kind = plane.info.kind;
-                let mut statistics = self.planes.get(kind).cloned().unwrap_or_default();
-                statistics.count(plane);
-                self.planes.set(kind, Some(statistics));
-            }
+            whole.expected.iter().for_each(|plane| self.count_plane(plane));
             self.frames.push(whole.entry);
         }
         Ok(())

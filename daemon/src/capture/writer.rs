@@ -1,4 +1,4 @@
-//! Writing a capture: streams, frames, late cameras and gaps, as they happen.
+//! Writing a capture: streams, frames, late cameras, UI planes and gaps, as they happen.
 //!
 //! The writer does its work on the caller's thread and spawns none, so that a recorder can put it
 //! behind a queue and the cores stay with the engine. After each call everything handed over is in
@@ -11,7 +11,7 @@ use std::path::Path;
 
 use foreframe_protocol::{
     Body as _, CreateStream, LateCamera, PlaneDescriptor, PlaneKind, PlaneSize, StreamFormat,
-    Submit,
+    Submit, UiPlane,
 };
 
 use super::codec::Coding;
@@ -35,6 +35,7 @@ struct OpenStream {
     format: StreamFormat,
     frames: u32,
     poses: u32,
+    ui_planes: u32,
 }
 
 impl CaptureWriter {
@@ -77,7 +78,8 @@ impl<W: Write> CaptureWriter<W> {
             return Err(unrecordable("a stream", bad));
         }
         self.container.stream(id, &create.to_bytes())?;
-        self.streams.push(OpenStream { id, format: create.format, frames: 0, poses: 0 });
+        let format = create.format;
+        self.streams.push(OpenStream { id, format, frames: 0, poses: 0, ui_planes: 0 });
         Ok(())
     }
 
@@ -129,6 +131,35 @@ impl<W: Write> CaptureWriter<W> {
         };
         stream.poses = stream.poses.wrapping_add(1);
         self.container.late_camera(stream.id, stamp, &pose.to_bytes())
+    }
+
+    /// Records a user interface that came between key frames, with its pixels. Returns the bytes
+    /// that they take in the file.
+    ///
+    /// # Errors
+    /// If its stream was not added, the plane does not fit the stream's format, or the file cannot be
+    /// written.
+    pub fn ui_plane(
+        &mut self,
+        arrived_at_ns: u64,
+        ui: &UiPlane,
+        plane: &PlaneBytes<'_>,
+    ) -> Result<u64, CaptureError> {
+        let Some(stream) = self.streams.iter_mut().find(|stream| stream.id == ui.stream) else {
+            let bad = BadRecord::new("a UI plane of a stream that was added", ui.stream);
+            return Err(unrecordable("a UI plane", bad));
+        };
+        if pixel_layout(&stream.format, PlaneKind::Ui) != Some(plane.info.layout) {
+            let bad = BadRecord::new("UI planes as the stream declares", plane.info.layout);
+            return Err(unrecordable("a UI plane", bad));
+        }
+        let stamp = Stamp {
+            log_time: arrived_at_ns,
+            publish_time: arrived_at_ns,
+            sequence: stream.ui_planes,
+        };
+        stream.ui_planes = stream.ui_planes.wrapping_add(1);
+        self.container.ui_plane(stream.id, stamp, ui, plane, self.coding)
     }
 
     /// Records that frames are missing.

@@ -18,18 +18,18 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use foreframe_engine::MonoTime;
-use foreframe_protocol::{CreateStream, LateCamera, PlaneKind, StreamFormat, Submit};
+use foreframe_protocol::{
+    CreateStream, LateCamera, PlaneDescriptor, PlaneKind, PlaneMap, StreamFormat, Submit, UiPlane,
+};
 use rustix::fs::{Mode, OFlags, fcntl_getfl, fcntl_setfl, open};
 use tracing::warn;
 
-use crate::capture::{
-    CaptureError, CaptureWriter, Gap, PlaneBytes, PlaneInfo, SessionInfo, pixel_layout,
-};
+use crate::capture::{CaptureError, CaptureWriter, Gap, PlaneBytes, PlaneInfo, SessionInfo};
 use crate::stream::planes::KeyPlanes;
 
 /// Late cameras that wait for the next key; of more, the oldest are left out.
 const HELD_POSES: usize = 256;
-/// Keys that may wait for the disk, over all streams. At 60 keys a second this rides out a stall of
+/// Keys and UI planes that may wait for the disk, over all streams. At 60 keys a second this rides out a stall of
 /// 130 ms; each costs one set of planes of memory.
 const QUEUED_KEYS: usize = 8;
 
@@ -40,6 +40,11 @@ enum Job {
         before: Unsaid,
         arrived_at: MonoTime,
         submit: Submit,
+        planes: Arc<KeyPlanes>,
+    },
+    Ui {
+        arrived_at: MonoTime,
+        ui: UiPlane,
         planes: Arc<KeyPlanes>,
     },
     Unsaid(Unsaid),
@@ -174,6 +179,16 @@ impl StreamRecorder {
         self.count_missing(arrived_at);
     }
 
+    /// Hands over a UI plane that is shown from now on, or counts it as missing if the disk is behind.
+    /// Never waits.
+    pub fn offer_ui(&mut self, ui: &UiPlane, arrived_at: MonoTime, planes: &Arc<KeyPlanes>) {
+        let ui = UiPlane { stream: self.number, ..*ui };
+        let job = Job::Ui { arrived_at, ui, planes: Arc::clone(planes) };
+        if !self.try_announce() || self.jobs.try_send(job).is_err() {
+            self.count_missing(arrived_at);
+        }
+    }
+
     /// Hands over a pose that leads pictures from now on. It is recorded with the next key.
     pub fn offer_late_camera(&mut self, pose: &LateCamera, arrived_at: MonoTime) {
         let poses = &mut self.unsaid.poses;
@@ -285,13 +300,16 @@ fn record<W: io::Write>(
         Job::End => Ok(()),
         Job::Key { before, arrived_at, submit, planes } => {
             record_unsaid(writer, &before)?;
-            let format = formats.iter().find(|(number, _)| *number == submit.stream);
-            let (_, format) = format.expect("a stream is announced before its keys");
-            let infos = PlaneKind::ALL.iter().filter_map(|&kind| plane(format, &submit, kind));
-            let planes: Vec<PlaneBytes<'_>> = infos
-                .filter_map(|info| Some(PlaneBytes::tight(info, planes.get(info.kind)?)))
-                .collect();
+            let format = format_of(formats, submit.stream);
+            let planes = plane_bytes(format, &submit.planes, submit.motion_from_ns, &planes);
             writer.write_frame(arrived_at.as_ns(), &submit, &planes).map(|_| ())
+        }
+        Job::Ui { arrived_at, ui, planes } => {
+            let format = format_of(formats, ui.stream);
+            let described = PlaneMap::from_fn(|kind| (kind == PlaneKind::Ui).then_some(ui.plane));
+            plane_bytes(format, &described, None, &planes)
+                .iter()
+                .try_for_each(|plane| writer.ui_plane(arrived_at.as_ns(), &ui, plane).map(|_| ()))
         }
     }
 }
@@ -309,18 +327,21 @@ fn record_unsaid<W: io::Write>(
         .try_for_each(|(pose, arrived_at)| writer.late_camera(arrived_at.as_ns(), pose))
 }
 
-fn plane(format: &StreamFormat, submit: &Submit, kind: PlaneKind) -> Option<PlaneInfo> {
-    let plane = submit.planes.get(kind)?;
-    Some(PlaneInfo {
-        kind,
-        which: 0,
-        layout: pixel_layout(format, kind)?,
-        width: plane.width,
-        height: plane.height,
-        valid: plane.valid,
-        jitter: plane.jitter,
-        motion_from_ns: submit.motion_from_ns.filter(|_| kind == PlaneKind::Motion),
-    })
+fn format_of(formats: &[(u32, StreamFormat)], stream: u32) -> &StreamFormat {
+    let format = formats.iter().find(|(number, _)| *number == stream);
+    format.map(|(_, format)| format).expect("a stream is announced before its keys")
+}
+
+/// The planes that are there, in the order of their kinds, as the writer takes them.
+fn plane_bytes<'a>(
+    format: &StreamFormat,
+    described: &PlaneMap<PlaneDescriptor>,
+    motion_from_ns: Option<u64>,
+    planes: &'a KeyPlanes,
+) -> Vec<PlaneBytes<'a>> {
+    let info = |(kind, plane)| PlaneInfo::described(format, kind, plane, motion_from_ns);
+    let infos = described.iter().filter_map(info);
+    infos.filter_map(|info| Some(PlaneBytes::tight(info, planes.get(info.kind)?))).collect()
 }
 
 #[cfg(test)]

@@ -110,7 +110,7 @@ impl Source {
             };
             self.next_key += 1;
             let format = &self.create.format;
-            let planes = self.copier.copy(format, &submit, &self.memory, 0).unwrap();
+            let planes = self.copier.copy(format, &submit.planes, &self.memory, 0).unwrap();
             recorder.offer(&submit, arrived_at, &planes);
         }
     }

@@ -134,9 +134,10 @@ impl Daemon {
         let allocator =
             Allocator::spawn(pools).context("starting the thread that allocates memory")?;
         let features = match config.sink {
-            SinkSpec::Null => Features::LATE_CAMERA,
-            _ => Features::LATE_CAMERA.with(Features::OUTPUT),
+            SinkSpec::Null => Features::NONE,
+            _ => Features::OUTPUT,
         };
+        let features = features.with(Features::LATE_CAMERA).with(Features::UI_PLANE);
         let terms = Terms {
             features,
             max_streams: MAX_STREAMS,

@@ -11,14 +11,14 @@ use foreframe_engine::MonoTime;
 use foreframe_protocol::memory::ReadOnlyPool;
 use foreframe_protocol::{
     ClientMessage, CreateStream, DestroyStream, EndReason, Error, ErrorCode, OutputReleased,
-    PoolAccepted, RegisterPool, ReleaseReason, SlotReleased, StreamCreated, Submit,
+    PoolAccepted, RegisterPool, ReleaseReason, SlotReleased, StreamCreated, Submit, UiPlane,
 };
 
 use super::streams::{Pool, stream_cost};
 use super::{MAX_STREAMS, Server};
 use crate::session::Session;
 use crate::session::fault::Fault;
-use crate::stream::mailbox::Submission;
+use crate::stream::mailbox::{Submission, UiSubmission};
 
 impl Server {
     /// Acts on a message.
@@ -54,6 +54,9 @@ impl Server {
             ClientMessage::Submit(submit) => {
                 self.submit(id, submit, now).map_err(|it| it.of_stream(submit.stream))
             }
+            ClientMessage::UiPlane(ui) => {
+                self.submit_ui(id, ui, now).map_err(|it| it.of_stream(ui.stream))
+            }
             ClientMessage::LateCamera(camera) => {
                 self.stream_of(id, camera.stream)?.mailbox.put_late_camera(camera, now);
                 Ok(())
@@ -84,7 +87,14 @@ impl Server {
             let fault = Fault::fatal(ErrorCode::Quota, "create_stream", expected, "one more");
             return Err(fault.tolerated().of_stream(number));
         }
-        let cost = stream_cost(&create.format);
+        let format = &create.format;
+        if let Some(ui) = format.ui.filter(|ui| *ui != format.color) {
+            let expected = format!("{}, as colour has", format.color);
+            let fault =
+                Fault::fatal(ErrorCode::Unsupported, "create_stream.ui_format", expected, ui);
+            return Err(fault.tolerated().of_stream(number));
+        }
+        let cost = stream_cost(create);
         if session.cost.saturating_add(cost) > memory_per_client {
             let fault = quota_fault("create_stream", memory_per_client, session.cost, cost);
             return Err(fault.tolerated().of_stream(number));
@@ -176,6 +186,37 @@ impl Server {
                     reason: ReleaseReason::Superseded,
                 },
             );
+        }
+        Ok(())
+    }
+
+    fn submit_ui(&mut self, id: u32, ui: UiPlane, now: MonoTime) -> Result<(), Fault> {
+        let UiPlane { stream: number, slot, ui_index, .. } = ui;
+        let stream = self.stream_of(id, number)?;
+        let Some(pool) = &stream.pool else {
+            let expected = "a pool for the stream before its first UI plane";
+            return Err(Fault::fatal(ErrorCode::State, "ui_plane", expected, "none"));
+        };
+        let released =
+            |slot, key_index, reason| SlotReleased { stream: number, slot, key_index, reason };
+        match ui.check(&stream.create, pool.slot_bytes) {
+            Ok(()) => {}
+            Err(error @ Error::Plane { .. }) => {
+                stream.mailbox.refuse_ui(&ui)?;
+                self.send(id, released(slot, ui_index, ReleaseReason::Refused));
+                return Err(Fault::from(error).tolerated());
+            }
+            Err(error) => return Err(error.into()),
+        }
+        stream.ui_order.advance(&ui)?;
+        let superseded = stream.mailbox.put_ui(UiSubmission {
+            ui,
+            arrived_at: now,
+            pool: Arc::clone(&pool.memory),
+            slot_offset: u64::from(slot) * pool.slot_bytes,
+        })?;
+        if let Some(older) = superseded {
+            self.send(id, released(older.slot, older.key_index, ReleaseReason::Superseded));
         }
         Ok(())
     }

@@ -6,9 +6,10 @@ use std::thread::JoinHandle;
 use anyhow::Context as _;
 use foreframe_engine::{EngineConfig, MonoTime, StreamFormat as EngineFormat};
 use foreframe_protocol::memory::ReadOnlyPool;
+use foreframe_protocol::slots::UiOrder;
 use foreframe_protocol::{
-    CreateStream, EndReason, ErrorCode, OutputFrame, Pacing, Presented, ReleaseReason,
-    SlotReleased, Statistics, StreamEnded, StreamFormat,
+    CreateStream, EndReason, ErrorCode, OutputFrame, Pacing, PlaneKind, Presented, ReleaseReason,
+    SlotReleased, Statistics, StreamEnded,
 };
 use tracing::{debug, error, info};
 
@@ -35,6 +36,7 @@ pub(super) struct Stream {
     pub(super) create: CreateStream,
     pub(super) mailbox: Arc<Mailbox>,
     pub(super) order: KeyOrder,
+    pub(super) ui_order: UiOrder,
     pub(super) pool: Option<Pool>,
     /// Bytes that it costs its client, pool included.
     pub(super) cost: u64,
@@ -69,10 +71,15 @@ impl Stream {
 }
 
 /// Bytes of private memory that a stream may take: eight pictures (two keys, a copy, the one being
-/// made, four on the way to a sink) and 48 bytes a pixel of depth, motion and what the warp needs.
-pub(super) fn stream_cost(format: &StreamFormat) -> u64 {
-    let pixels = u64::from(format.width) * u64::from(format.height);
-    pixels * (8 * u64::from(format.color.bytes_per_pixel()) + 48)
+/// made, four on the way to a sink), 48 bytes a pixel of depth, motion and what the warp needs, and a
+/// user interface.
+pub(super) fn stream_cost(create: &CreateStream) -> u64 {
+    let bytes_per_pixel = u64::from(create.format.color.bytes_per_pixel());
+    let area = |kind| {
+        let size = create.max_sizes.get(kind);
+        size.map_or(0, |size| u64::from(size.width) * u64::from(size.height))
+    };
+    area(PlaneKind::Color) * (8 * bytes_per_pixel + 48) + area(PlaneKind::Ui) * bytes_per_pixel
 }
 
 impl Server {
@@ -132,6 +139,7 @@ impl Server {
                 create: *create,
                 mailbox,
                 order: KeyOrder::default(),
+                ui_order: UiOrder::default(),
                 pool: None,
                 cost,
                 report: StreamStatus::default(),

@@ -15,7 +15,7 @@ use foreframe_engine::pacing::{
 };
 use foreframe_engine::{
     ColorPlane, DecodeError, Engine, EngineConfig, KeyInput, KeyReport, Method, MonoSpan, MonoTime,
-    Phase, StreamFormat,
+    Phase, StreamFormat, UiInput,
 };
 
 /// What a stream needs to know before its first key.
@@ -152,6 +152,7 @@ pub struct StreamCore {
     frame: ColorPlane,
     counts: FrameCounts,
     newest_key: Option<NewestKey>,
+    ui: NewestUi,
     shown: Option<Shown>,
     /// The last refresh that is counted.
     counted_until: Option<MonoTime>,
@@ -166,6 +167,15 @@ struct NewestKey {
     /// Whether pictures made from it differ from it.
     moves: bool,
     /// Keys taken in with it.
+    taken: u64,
+}
+
+/// The user interface over the pictures.
+#[derive(Clone, Copy, Debug, Default)]
+struct NewestUi {
+    /// When it came in.
+    arrived_at: MonoTime,
+    /// User interfaces taken in with it.
     taken: u64,
 }
 
@@ -187,6 +197,8 @@ struct Shown {
     content_time: MonoTime,
     /// Keys taken in when it was made. 0 if the display never showed it.
     keys: u64,
+    /// User interfaces taken in when it was made.
+    uis: u64,
 }
 
 impl StreamCore {
@@ -203,6 +215,7 @@ impl StreamCore {
             frame: ColorPlane::new(format.color, format.width, format.height),
             counts: FrameCounts::default(),
             newest_key: None,
+            ui: NewestUi::default(),
             shown: None,
             counted_until: None,
         }
@@ -293,6 +306,19 @@ impl StreamCore {
         Ok(report)
     }
 
+    /// Shows a user interface over every picture from now on, unless one that came in later is shown
+    /// already.
+    ///
+    /// # Errors
+    /// If its numbers do not describe pixels that are there. The one before stays.
+    pub fn set_ui(&mut self, input: &UiInput<'_>, arrived_at: MonoTime) -> Result<(), DecodeError> {
+        if arrived_at >= self.ui.arrived_at {
+            self.engine.set_ui(input)?;
+            self.ui = NewestUi { arrived_at, taken: self.ui.taken + 1 };
+        }
+        Ok(())
+    }
+
     /// The camera is at `view` by `content_time`: see [`Engine::late_camera`].
     pub fn late_camera(&mut self, content_time: MonoTime, view: [f32; 16]) {
         self.engine.late_camera(content_time, view);
@@ -310,10 +336,10 @@ impl StreamCore {
         let key = self.newest_key?;
         let content_time = self.shown_content_time(plan.content_time?, &key);
         self.pacer.start(plan);
-        let is_shown_already = self
-            .shown
-            .is_some_and(|shown| (shown.content_time, shown.keys) == (content_time, key.taken))
-            && !self.engine.alternates();
+        let asked = (content_time, key.taken, self.ui.taken);
+        let is_shown_already =
+            self.shown.is_some_and(|shown| (shown.content_time, shown.keys, shown.uis) == asked)
+                && !self.engine.alternates();
         if is_shown_already {
             if let Display::Timer(_) = self.display {
                 self.pacer.on_presented(plan.present_at, plan.present_at, plan.present_at);
@@ -361,7 +387,8 @@ impl StreamCore {
             let refreshes = self.refreshes(presented_at - shown.presented_at);
             (shown.index + refreshes, refreshes - 1)
         });
-        self.shown = Some(Shown { index, presented_at, content_time, keys: key.taken });
+        let (keys, uis) = (key.taken, self.ui.taken);
+        self.shown = Some(Shown { index, presented_at, content_time, keys, uis });
         Some(FrameOutcome::Presented(PresentedFrame {
             index,
             key_index: key.index,

@@ -1,4 +1,5 @@
-//! Hands key frames from the main loop to the stream's thread: one place, newest wins.
+//! Hands key frames from the main loop to the stream's thread: one place, newest wins. UI planes
+//! have a place of their own, beside them.
 //!
 //! Owns the slots of the stream: to put a key frame in is to submit its slot, to take it out is to
 //! latch it. What is in the box when the next one comes was never looked at, and its slot goes
@@ -8,8 +9,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use foreframe_engine::MonoTime;
 use foreframe_protocol::memory::ReadOnlyPool;
-use foreframe_protocol::slots::{SlotTable, SlotUse};
-use foreframe_protocol::{Error, LateCamera, Submit};
+use foreframe_protocol::slots::{Holds, SlotTable, SlotUse};
+use foreframe_protocol::{Error, LateCamera, Submit, UiPlane};
 
 use super::command::StreamCommand;
 use super::outlet::Outlet;
@@ -24,6 +25,19 @@ pub type Outlets = Arc<[Arc<Reaped<Outlet>>]>;
 pub struct Submission {
     /// What the client sent.
     pub submit: Submit,
+    /// When it came in.
+    pub arrived_at: MonoTime,
+    /// The memory of its slot.
+    pub pool: Arc<Reaped<ReadOnlyPool>>,
+    /// Bytes from the start of the pool to the slot.
+    pub slot_offset: u64,
+}
+
+/// A UI plane that lies in a slot, checked, with the memory that it lies in.
+#[derive(Clone, Debug)]
+pub struct UiSubmission {
+    /// What the client sent.
+    pub ui: UiPlane,
     /// When it came in.
     pub arrived_at: MonoTime,
     /// The memory of its slot.
@@ -68,6 +82,8 @@ struct State {
     slots: SlotTable,
     /// There whenever a slot is submitted.
     waiting: Option<Submission>,
+    /// There whenever a slot with a UI plane is submitted.
+    waiting_ui: Option<UiSubmission>,
     /// The pose of the newest content time that was not taken out yet, and when it came in.
     late_camera: Option<(LateCamera, MonoTime)>,
     commands: Vec<StreamCommand>,
@@ -83,6 +99,7 @@ impl Mailbox {
         let state = State {
             slots: SlotTable::new(slots),
             waiting: None,
+            waiting_ui: None,
             late_camera: None,
             commands: Vec::new(),
             counts: KeyCounts::default(),
@@ -100,7 +117,7 @@ impl Mailbox {
         let superseded = {
             let mut state = self.lock();
             let Submit { slot, key_index, .. } = submission.submit;
-            let superseded = state.slots.submit(slot, key_index)?;
+            let superseded = state.slots.submit(Holds::Key, slot, key_index)?;
             state.waiting = Some(submission);
             state.counts.received += 1;
             state.counts.superseded += u64::from(superseded.is_some());
@@ -110,6 +127,45 @@ impl Mailbox {
         Ok(superseded)
     }
 
+    /// Puts a UI plane in. Gives the older one that it replaces, whose slot is the client's again.
+    ///
+    /// # Errors
+    /// If its slot is not the client's.
+    pub fn put_ui(&self, submission: UiSubmission) -> Result<Option<SlotUse>, Error> {
+        let superseded = {
+            let mut state = self.lock();
+            let UiPlane { slot, ui_index, .. } = submission.ui;
+            let superseded = state.slots.submit(Holds::Ui, slot, ui_index)?;
+            state.waiting_ui = Some(submission);
+            superseded
+        };
+        // A stream that has nothing new to show waits for nothing else.
+        self.waker.wake();
+        Ok(superseded)
+    }
+
+    /// A UI plane does not go in, because it does not fit the stream.
+    ///
+    /// # Errors
+    /// If its slot is not the client's.
+    pub fn refuse_ui(&self, ui: &UiPlane) -> Result<(), Error> {
+        self.lock().slots.clone().submit(Holds::Ui, ui.slot, ui.ui_index).map(drop)
+    }
+
+    /// Whether a UI plane waits to be taken out.
+    #[must_use]
+    pub fn has_ui(&self) -> bool {
+        self.lock().waiting_ui.is_some()
+    }
+
+    /// Takes the UI plane out, and latches its slot.
+    pub fn take_ui(&self) -> Option<UiSubmission> {
+        let mut state = self.lock();
+        let submission = state.waiting_ui.take()?;
+        state.slots.latch(Holds::Ui);
+        Some(submission)
+    }
+
     /// A key frame does not go in, because its planes do not fit the stream.
     ///
     /// # Errors
@@ -117,7 +173,7 @@ impl Mailbox {
     pub fn refuse(&self, submit: &Submit) -> Result<(), Error> {
         let mut state = self.lock();
         // The slot is asked for and given back at once: on a copy, so that nothing is superseded.
-        state.slots.clone().submit(submit.slot, submit.key_index)?;
+        state.slots.clone().submit(Holds::Key, submit.slot, submit.key_index)?;
         state.counts.received += 1;
         state.counts.refused += 1;
         Ok(())
@@ -131,7 +187,7 @@ impl Mailbox {
         }
         match state.waiting.take() {
             Some(submission) => {
-                state.slots.latch();
+                state.slots.latch(Holds::Key);
                 Taken::Key(submission)
             }
             None => Taken::Nothing,
@@ -165,9 +221,9 @@ impl Mailbox {
         std::mem::take(&mut self.lock().commands)
     }
 
-    /// The planes of the key frame that was taken out are copied: its slot is the client's again.
-    pub fn release(&self) -> Option<SlotUse> {
-        self.lock().slots.release_latched()
+    /// The planes of what was taken out are copied: its slot is the client's again.
+    pub fn release(&self, holds: Holds) -> Option<SlotUse> {
+        self.lock().slots.release_latched(holds)
     }
 
     /// Ends the stream. What is in the box goes nowhere.
@@ -176,6 +232,7 @@ impl Mailbox {
             let mut state = self.lock();
             state.is_closed = true;
             state.waiting = None;
+            state.waiting_ui = None;
         }
         self.waker.wake();
     }

@@ -26,9 +26,9 @@ use foreframe_protocol::{ErrorMessage, OutputFrame, Pacing, Presented, Statistic
 /// What a stream's thread tells the main loop, in order.
 #[derive(Clone, PartialEq, Debug)]
 pub enum StreamEvent {
-    /// The planes of a key frame are copied.
+    /// The planes of a key frame, or a UI plane, are copied.
     SlotCopied(SlotUse),
-    /// A key frame does not fit its stream. The message has everything but the stream's number.
+    /// A key frame or UI plane does not fit its stream. The message has everything but the stream's number.
     KeyRefused(ErrorMessage),
     /// A key frame came to the display. Lacks the stream's number.
     Presented(Presented),

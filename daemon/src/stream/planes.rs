@@ -1,4 +1,4 @@
-//! The planes of a key on their way out of its slot.
+//! The planes of a key, or a UI plane by itself, on their way out of a slot.
 //!
 //! Every byte is copied out of shared memory before it is used. The engine does that itself,
 //! row by row, while it converts ([`SlotPlanes`]); where a recorder needs the planes as they came,
@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use foreframe_engine::ReadPixels;
 use foreframe_protocol::memory::ReadOnlyPool;
-use foreframe_protocol::{Error, PlaneKind, PlaneMap, StreamFormat, Submit};
+use foreframe_protocol::{Error, PlaneDescriptor, PlaneKind, PlaneMap, StreamFormat};
 
 /// The planes of one key, rows without padding.
 #[derive(Debug, Default)]
@@ -28,12 +28,12 @@ impl KeyPlanes {
     fn copy(
         &mut self,
         format: &StreamFormat,
-        submit: &Submit,
+        described: &PlaneMap<PlaneDescriptor>,
         pool: &ReadOnlyPool,
         slot_offset: u64,
     ) -> Result<(), Error> {
         self.present = 0;
-        for (kind, plane) in submit.planes.iter() {
+        for (kind, plane) in described.iter() {
             let Some(bytes_per_pixel) = format.bytes_per_pixel(kind) else { continue };
             let mut bytes = self.bytes.get_mut(kind).map(std::mem::take).unwrap_or_default();
             let row_bytes = plane.width.saturating_mul(bytes_per_pixel);
@@ -66,12 +66,12 @@ impl<'a> SlotPlanes<'a> {
     /// If a plane leaves the pool, which a checked submission does not.
     pub fn new(
         format: &StreamFormat,
-        submit: &Submit,
+        described: &PlaneMap<PlaneDescriptor>,
         pool: &'a ReadOnlyPool,
         slot_offset: u64,
     ) -> Result<Self, Error> {
         let mut planes = PlaneMap::default();
-        for (kind, plane) in submit.planes.iter() {
+        for (kind, plane) in described.iter() {
             let Some(bytes_per_pixel) = format.bytes_per_pixel(kind) else { continue };
             let row = u64::from(plane.width) * u64::from(bytes_per_pixel);
             let rows_before = u64::from(plane.height.saturating_sub(1));
@@ -116,7 +116,7 @@ impl PlaneCopier {
     pub fn copy(
         &mut self,
         format: &StreamFormat,
-        submit: &Submit,
+        described: &PlaneMap<PlaneDescriptor>,
         pool: &ReadOnlyPool,
         slot_offset: u64,
     ) -> Result<Arc<KeyPlanes>, Error> {
@@ -126,7 +126,7 @@ impl PlaneCopier {
             None => Arc::default(),
         };
         let planes = Arc::get_mut(&mut copy).expect("nobody else holds this copy");
-        planes.copy(format, submit, pool, slot_offset)?;
+        planes.copy(format, described, pool, slot_offset)?;
         // Copies that the recorder has worked off after a burst go now, with the next key.
         self.copies.retain(|copy| !is_unread(copy));
         self.copies.push(Arc::clone(&copy));

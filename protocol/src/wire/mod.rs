@@ -15,6 +15,7 @@ pub mod reject;
 pub mod session;
 pub mod stream;
 pub mod submit;
+pub mod ui;
 
 use crate::error::Result;
 use crate::layout::{EnumLayout, RawLayout, StructLayout};
@@ -55,6 +56,7 @@ pub fn struct_layouts() -> Vec<StructLayout> {
         submit::SubmitRaw::LAYOUT,
         submit::SlotReleasedRaw::LAYOUT,
         camera::LateCameraRaw::LAYOUT,
+        ui::UiPlaneRaw::LAYOUT,
         feedback::PresentedRaw::LAYOUT,
         feedback::StatisticsRaw::LAYOUT,
         feedback::PacingRaw::LAYOUT,

@@ -129,7 +129,7 @@ impl Submit {
     }
 }
 
-fn plane_raw(plane: Option<&PlaneDescriptor>) -> PlaneRaw {
+pub(super) fn plane_raw(plane: Option<&PlaneDescriptor>) -> PlaneRaw {
     let Some(plane) = plane else { return zerocopy::FromZeros::new_zeroed() };
     PlaneRaw {
         offset: U64::new(plane.offset),
@@ -145,7 +145,7 @@ fn plane_raw(plane: Option<&PlaneDescriptor>) -> PlaneRaw {
     }
 }
 
-fn plane(check: Check, kind: PlaneKind, raw: &PlaneRaw) -> Result<PlaneDescriptor> {
+pub(super) fn plane(check: Check, kind: PlaneKind, raw: &PlaneRaw) -> Result<PlaneDescriptor> {
     check.zero("planes.reserved", &raw.reserved)?;
     let plane = PlaneDescriptor {
         offset: raw.offset.get(),
@@ -294,7 +294,7 @@ pub struct SlotReleased {
     pub stream: u32,
     /// The slot.
     pub slot: u32,
-    /// The key frame that was in it.
+    /// The key frame that was in it, or `ui_index` of the UI plane.
     pub key_index: u64,
     /// What became of it.
     pub reason: ReleaseReason,

@@ -2,7 +2,7 @@
 
 use foreframe_protocol::*;
 
-use crate::samples::{IDENTITY, SLOT_BYTES, output_pool, stream, submit};
+use crate::samples::{IDENTITY, SLOT_BYTES, output_pool, stream, submit, ui_plane};
 
 fn hello() -> Hello {
     Hello {
@@ -42,6 +42,7 @@ pub(crate) fn client_packets() -> Vec<(String, Vec<u8>)> {
         DestroyStream { stream: 1 }.into(),
         submit().into(),
         LateCamera { stream: 1, content_time_ns: 2_000_000_000, view: IDENTITY }.into(),
+        ui_plane().into(),
         Subscribe { stream: 0, slots: 3 }.into(),
         Unsubscribe { stream: 0 }.into(),
         OutputReleased { pool: 4, slot: 1 }.into(),

@@ -1,4 +1,4 @@
-//! A stream with every plane, a key frame of it, and a pool for its output.
+//! A stream with every plane, a key frame and a UI plane of it, and a pool for its output.
 
 use foreframe_protocol::*;
 
@@ -47,6 +47,15 @@ pub(crate) fn submit() -> Submit {
         camera: Some(camera),
         motion_from_camera: Some(camera),
     }
+}
+
+pub(crate) fn ui_plane() -> UiPlane {
+    let size = PlaneSize { width: 320, height: 64 };
+    let plane = PlaneDescriptor {
+        valid: Rect { x: 8, y: 2, width: 300, height: 60 },
+        ..PlaneDescriptor::packed(4096, size, 4)
+    };
+    UiPlane { stream: 1, slot: 1, ui_index: 900, place: [-20, 1000], plane }
 }
 
 /// Bytes of a slot that holds [`submit`].

@@ -33,6 +33,7 @@ struct Report {
     planes: Vec<&'static str>,
     camera: bool,
     late_cameras: usize,
+    ui_planes: usize,
     name: String,
     source: foreframed::capture::CaptureSource,
     software: String,
@@ -86,6 +87,9 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
             frame.with_context(named)?;
             bar.inc(1);
         }
+        for number in 0..report.ui_planes {
+            capture.ui_pixels(number).with_context(named)?;
+        }
         bar.finish_and_clear();
         report.verified = Some(info.frames);
     }
@@ -104,6 +108,7 @@ impl Report {
             planes: info.planes.iter().map(|planes| planes.kind.name()).collect(),
             camera: info.camera,
             late_cameras: info.streams.iter().map(|stream| stream.late_cameras).sum(),
+            ui_planes: info.streams.iter().map(|stream| stream.ui_planes).sum(),
             name: info.session.name.clone(),
             source: info.session.source,
             software: info.session.software.clone(),
@@ -182,6 +187,9 @@ fn text(report: &Report) -> String {
         (true, poses) => format!("yes, and {poses} late poses"),
     };
     line("camera", camera);
+    if report.ui_planes > 0 {
+        line("ui", format!("{} planes between key frames", report.ui_planes));
+    }
     for stream in &report.streams {
         let depth = stream.depth.as_deref().unwrap_or("none");
         let motion = stream.motion.as_deref().unwrap_or("none");

@@ -20,7 +20,7 @@ use crate::recording::capture::CaptureRecording;
 use crate::recording::keys::KeyReader;
 use crate::recording::plan::Plan;
 use crate::virtual_time::digest::FrameDigester;
-use crate::virtual_time::keys::{KeyTiming, timed_keys, timed_poses};
+use crate::virtual_time::keys::{KeyTiming, timed_keys, timed_poses, timed_uis};
 use crate::virtual_time::{OutputFrame, OutputKind, ReplayConfig, replay};
 
 /// Arguments of `foreframe replay`.
@@ -143,13 +143,15 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
     let mut sink = Sink::open(&args.sink, reader.format(), refresh_interval, 0)
         .with_context(|| format!("--sink {}", args.sink))?;
 
+    let uis = timed_uis(&recording.ui_arrivals(), recording.heads(), &plan, timing);
+    let uis = recording.read_uis(uis);
     let progress = output.progress("replaying", plan.keys.len() as u64);
     let keys = timed_keys(&mut recording, &reader, &plan, timing).inspect(|_| progress.inc(1));
     let mut digester = FrameDigester::default();
     let mut frames: Vec<ReplayedFrame> = Vec::new();
     let mut first = None;
     let mut next_index = 0;
-    let losses = replay(*reader.format(), &config, keys, |frame, picture| {
+    let losses = replay(*reader.format(), &config, keys, uis, |frame, picture| {
         // A refresh whose picture was dropped showed the one before again.
         let passed = frame.index - next_index;
         next_index = frame.index + 1;

@@ -5,6 +5,7 @@
 
 use std::fs::File;
 use std::path::Path;
+use std::sync::Arc;
 
 use anyhow::Context as _;
 use foreframe_engine::{KeyInput, MonoTime, PlaneInput, StreamFormat};
@@ -15,7 +16,7 @@ use foreframed::capture::{
 use foreframed::ingest::{self, PlaneSource};
 
 use super::{Frame, FrameHead, OwnedPlane, Recording, Wanted};
-use crate::virtual_time::TimedPose;
+use crate::virtual_time::{TimedPose, TimedUi};
 
 /// What a user should know about a file that is not whole: one line each.
 #[must_use]
@@ -34,7 +35,7 @@ pub fn warnings(info: &CaptureInfo) -> Vec<String> {
 /// The first stream of a capture that has frames.
 #[derive(Debug)]
 pub struct CaptureRecording<S = File> {
-    capture: Capture<S>,
+    capture: Arc<Capture<S>>,
     stream: usize,
     format: StreamFormat,
     heads: Vec<FrameHead>,
@@ -85,7 +86,7 @@ impl<S: ReadAt> CaptureRecording<S> {
             places.push(Place { number, motions });
         }
         let format = ingest::stream_format(&capture.streams()[stream].format);
-        Ok(Self { capture, stream, format, heads, places })
+        Ok(Self { capture: Arc::new(capture), stream, format, heads, places })
     }
 
     /// What was recorded.
@@ -141,6 +142,31 @@ impl<S: ReadAt> CaptureRecording<S> {
             .collect()
     }
 
+    /// When each user interface arrived that came between key frames, and its number in the file.
+    #[must_use]
+    pub fn ui_arrivals(&self) -> Vec<(usize, MonoTime)> {
+        let numbered = self.capture.ui_planes().enumerate();
+        let of_stream = numbered.filter(|(_, captured)| captured.stream == self.stream);
+        of_stream.map(|(number, it)| (number, MonoTime::from_ns(it.arrived_at_ns))).collect()
+    }
+
+    /// Reads user interfaces by their numbers in the file, each dated as its number comes with.
+    pub fn read_uis(
+        &self,
+        numbered: Vec<(usize, MonoTime)>,
+    ) -> impl Iterator<Item = anyhow::Result<TimedUi>> + use<S> {
+        let (capture, stream) = (Arc::clone(&self.capture), self.stream);
+        numbered.into_iter().map(move |(number, arrives_at)| {
+            let captured =
+                capture.ui_planes().nth(number).context("the user interface is there")?;
+            let (ui, pixels) = (captured.ui, capture.ui_pixels(number)?.bytes);
+            let format = &capture.streams()[stream].format;
+            let input = ingest::ui_input(format, &ui, PlaneSource::Packed(&pixels))?;
+            let plane = owned(input.plane, &pixels);
+            Ok(TimedUi { arrives_at, place: input.place, plane })
+        })
+    }
+
     /// What a user should know about the file before trusting a result: one line each.
     ///
     /// # Errors
@@ -183,11 +209,13 @@ impl<S: ReadAt> Recording for CaptureRecording<S> {
             Wanted::Key { motion: Some(plane) } => Some(place.motions[plane]),
             Wanted::Key { motion: None } | Wanted::Color => None,
         };
+        let format = &self.capture.streams()[self.stream].format;
         let is_wanted = |info: &PlaneInfo| match info.kind {
             PlaneKind::Color => true,
             PlaneKind::Depth => wanted != Wanted::Color,
             PlaneKind::Motion => motion == Some(*info),
-            PlaneKind::Ui | PlaneKind::Mask => false,
+            PlaneKind::Ui => wanted != Wanted::Color && format.ui == Some(format.color),
+            PlaneKind::Mask => false,
         };
         let captured = self.capture.frame_with(place.number, is_wanted)?;
         let mut submit = captured.submit;
@@ -197,11 +225,11 @@ impl<S: ReadAt> Recording for CaptureRecording<S> {
                 submit.planes.set(kind, None);
             }
         }
-        let format = &self.capture.streams()[self.stream].format;
         let bytes = |kind| captured.plane(kind).map(|plane: &CapturedPlane| &plane.bytes[..]);
         let source = |kind| bytes(kind).map(PlaneSource::Packed);
         let input = ingest::key_input(format, &submit, source)?;
-        Ok(frame_of(&input, bytes))
+        let ui = ingest::ui_of_key(format, &submit, source)?;
+        Ok(frame_of(&input, ui.map(|ui| ui.plane), bytes))
     }
 }
 
@@ -234,16 +262,24 @@ impl<S: ReadAt> CaptureRecording<S> {
     }
 }
 
-/// The frame of `input`, whose pixels are in `bytes`.
-fn frame_of<'a>(input: &KeyInput<'_>, bytes: impl Fn(PlaneKind) -> Option<&'a [u8]>) -> Frame {
-    let plane = |kind: PlaneKind, plane: PlaneInput<'_>| OwnedPlane {
-        bytes: bytes(kind).unwrap_or_default().to_vec(),
+fn owned(plane: PlaneInput<'_>, bytes: &[u8]) -> OwnedPlane {
+    OwnedPlane {
+        bytes: bytes.to_vec(),
         width: plane.width,
         height: plane.height,
         stride: plane.stride,
         valid: plane.valid,
         jitter: plane.jitter,
-    };
+    }
+}
+
+/// The frame of `input` and `ui`, whose pixels are in `bytes`.
+fn frame_of<'a>(
+    input: &KeyInput<'_>,
+    ui: Option<PlaneInput<'_>>,
+    bytes: impl Fn(PlaneKind) -> Option<&'a [u8]>,
+) -> Frame {
+    let plane = |kind, plane| owned(plane, bytes(kind).unwrap_or_default());
     Frame {
         index: input.index,
         content_time: input.content_time,
@@ -252,6 +288,7 @@ fn frame_of<'a>(input: &KeyInput<'_>, bytes: impl Fn(PlaneKind) -> Option<&'a [u
         color: plane(PlaneKind::Color, input.color),
         depth: input.depth.map(|depth| plane(PlaneKind::Depth, depth)),
         motion: input.motion.map(|motion| plane(PlaneKind::Motion, motion)),
+        ui: ui.map(|ui| plane(PlaneKind::Ui, ui)),
         camera: input.camera,
         motion_from_camera: input.motion_from_camera,
     }

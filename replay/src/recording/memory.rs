@@ -149,6 +149,7 @@ impl Recording for MemoryRecording {
             color: stored.color.clone(),
             depth,
             motion: motion.map(|plane| stored.motions[plane].clone()),
+            ui: None,
             camera: None,
             motion_from_camera: None,
         })

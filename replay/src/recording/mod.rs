@@ -14,7 +14,7 @@ pub(crate) mod memory;
 pub mod plan;
 
 use foreframe_engine::key::Camera;
-use foreframe_engine::{KeyInput, MonoTime, Pixels, PlaneInput, Rect, StreamFormat};
+use foreframe_engine::{KeyInput, MonoTime, Pixels, PlaneInput, Rect, StreamFormat, UiInput};
 
 /// What a frame has, without its pixels.
 #[derive(Clone, PartialEq, Debug)]
@@ -78,6 +78,8 @@ pub struct Frame {
     pub depth: Option<OwnedPlane>,
     /// Motion.
     pub motion: Option<OwnedPlane>,
+    /// User interface, in the format of colour. Only what is replayed shows it.
+    pub ui: Option<OwnedPlane>,
     /// Camera at `content_time`.
     pub camera: Option<Camera>,
     /// Camera at `motion_from`.
@@ -100,6 +102,12 @@ impl Frame {
             motion_from_camera: self.motion_from_camera,
         }
     }
+
+    /// Its user interface as the engine takes it.
+    #[must_use]
+    pub fn ui_input(&self) -> Option<UiInput<'_>> {
+        self.ui.as_ref().map(|ui| UiInput { plane: ui.as_input(), place: [0; 2] })
+    }
 }
 
 /// Which planes of a frame to read. Camera and colour always are.
@@ -107,7 +115,7 @@ impl Frame {
 pub enum Wanted {
     /// Colour alone: a ground truth.
     Color,
-    /// Colour, depth, and one of the motion planes of [`FrameHead::motions`], if any.
+    /// Colour, depth, user interface, and one of the motion planes of [`FrameHead::motions`], if any.
     Key {
         /// Which one.
         motion: Option<usize>,

@@ -161,6 +161,7 @@ impl KeyShot {
             color: self.plane(&self.color, 4),
             depth: self.has_depth.then(|| fields(&depth, 4)),
             motion: self.has_motion.then(|| fields(&motion, 8)),
+            ui: None,
             camera: Some(self.camera),
             motion_from_camera: Some(self.motion_from_camera),
         }

@@ -1,4 +1,4 @@
-//! When the keys and the late cameras of a recording arrive on the virtual clock.
+//! When the keys, the late cameras and the user interfaces of a recording arrive on the virtual clock.
 
 use foreframe_engine::MonoTime;
 
@@ -56,19 +56,45 @@ pub fn timed_poses(
     plan: &Plan,
     timing: KeyTiming,
 ) -> Vec<TimedPose> {
-    let arrivals = arrivals(heads, plan, timing);
-    let keys = || plan.keys.iter().map(|key| &heads[key.frame]).zip(&arrivals);
-    let mut poses: Vec<_> = recorded
-        .iter()
-        .filter_map(|pose| {
-            let (key, &key_arrives_at) =
-                keys().take_while(|(key, _)| key.arrived_at <= pose.arrives_at).last()?;
-            let arrives_at = key_arrives_at + (pose.arrives_at - key.arrived_at);
-            Some(TimedPose { arrives_at, ..*pose })
-        })
+    let mut poses: Vec<_> = beside_keys(recorded, |pose| pose.arrives_at, heads, plan, timing)
+        .map(|(pose, arrives_at)| TimedPose { arrives_at, ..*pose })
         .collect();
     poses.sort_by_key(|pose| pose.arrives_at);
     poses
+}
+
+/// The same for user interfaces, by their numbers in the file.
+#[must_use]
+pub fn timed_uis(
+    recorded: &[(usize, MonoTime)],
+    heads: &[FrameHead],
+    plan: &Plan,
+    timing: KeyTiming,
+) -> Vec<(usize, MonoTime)> {
+    let mut uis: Vec<_> = beside_keys(recorded, |(_, arrives_at)| *arrives_at, heads, plan, timing)
+        .map(|((number, _), arrives_at)| (*number, arrives_at))
+        .collect();
+    uis.sort_by_key(|(_, arrives_at)| *arrives_at);
+    uis
+}
+
+/// What was `recorded` beside keys, without what arrived before the first, and when it arrives: as
+/// far behind its key as it did then.
+fn beside_keys<'a, T>(
+    recorded: &'a [T],
+    arrived_at: impl Fn(&T) -> MonoTime + 'a,
+    heads: &'a [FrameHead],
+    plan: &'a Plan,
+    timing: KeyTiming,
+) -> impl Iterator<Item = (&'a T, MonoTime)> {
+    let arrivals = arrivals(heads, plan, timing);
+    recorded.iter().filter_map(move |one| {
+        let arrived_at = arrived_at(one);
+        let keys = plan.keys.iter().map(|key| &heads[key.frame]).zip(&arrivals);
+        let (key, key_arrives_at) =
+            keys.take_while(|(key, _)| key.arrived_at <= arrived_at).last()?;
+        Some((one, *key_arrives_at + (arrived_at - key.arrived_at)))
+    })
 }
 
 #[cfg(test)]

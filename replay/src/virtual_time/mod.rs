@@ -11,12 +11,13 @@ pub mod keys;
 use foreframe_engine::backend::gpu::Gpu;
 use foreframe_engine::{
     ColorPlane, EngineConfig, FinishConfig, Method, MonoSpan, MonoTime, Phase, StreamFormat,
+    UiInput,
 };
 use foreframed::stream::core::{CoreConfig, FrameKind, FrameOutcome, PresentedFrame, StreamCore};
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 
-use crate::recording::Frame;
+use crate::recording::{Frame, OwnedPlane};
 
 /// Time that making a frame takes, unless a quarter of the refresh interval is less.
 const MAX_WORK: MonoSpan = MonoSpan::from_ms(1);
@@ -104,15 +105,27 @@ pub struct TimedPose {
     pub view: [f32; 16],
 }
 
-/// Replays `keys` and hands each output frame to `show`. Ends one key interval after the last key,
-/// and not before a picture was shown.
+/// A user interface that comes between keys, and when it arrives.
+#[derive(Clone, Debug)]
+pub struct TimedUi {
+    /// On the virtual clock; not before the one before.
+    pub arrives_at: MonoTime,
+    /// Column and row of the output that its first pixel lies on.
+    pub place: [i32; 2],
+    /// Its pixels, in the format of the stream.
+    pub plane: OwnedPlane,
+}
+
+/// Replays `keys`, with the user interfaces `uis` between them, and hands each output frame to `show`.
+/// Ends one key interval after the last key, and not before everything was shown.
 ///
 /// # Errors
-/// Those of `keys` and of `show`.
+/// Those of `keys`, of `uis` and of `show`.
 pub fn replay(
     format: StreamFormat,
     config: &ReplayConfig,
     keys: impl IntoIterator<Item = anyhow::Result<TimedKey>>,
+    uis: impl IntoIterator<Item = anyhow::Result<TimedUi>>,
     mut show: impl FnMut(&OutputFrame, &ColorPlane) -> anyhow::Result<()>,
 ) -> anyhow::Result<Losses> {
     let mut losses = Losses::default();
@@ -123,6 +136,9 @@ pub fn replay(
     let mut next = Some(first);
     let mut last_arrivals = [clock; 2];
     let mut poses = &config.late_cameras[..];
+    let mut uis = uis.into_iter();
+    let mut next_ui = uis.next().transpose()?;
+    let mut last_ui = MonoTime::ZERO;
     loop {
         let plan = stream.core.plan(clock);
         let is_taken = |key: &mut TimedKey| {
@@ -139,17 +155,29 @@ pub fn replay(
             }
             last_arrivals = [last_arrivals[1], key.arrives_at];
             match stream.core.on_key(&key.frame.as_input(), || clock) {
-                Ok(_) => stream.owes_picture = true,
+                Ok(_) => {
+                    stream.owes_picture = true;
+                    if let Some(ui) = key.frame.ui_input() {
+                        stream.core.set_ui(&ui, key.arrives_at)?;
+                    }
+                }
                 Err(error) => losses.refused.push(format!("key {}: {error}", key.frame.index)),
             }
             continue;
         }
         let interval = (last_arrivals[1] - last_arrivals[0]).max(config.refresh_interval);
-        let has_shown_all = next.is_none() && !stream.owes_picture;
-        let is_over = has_shown_all && plan.present_at > last_arrivals[1] + interval;
+        let has_shown_all = next.is_none() && next_ui.is_none() && !stream.owes_picture;
+        let end = (last_arrivals[1] + interval).max(last_ui + config.refresh_interval);
+        let is_over = has_shown_all && plan.present_at > end;
         if plan.content_time.is_none() || (is_over && stream.shown.is_some()) {
             losses.fell_back = stream.core.backend().fell_back.clone();
             return Ok(losses);
+        }
+        while let Some(ui) = next_ui.take_if(|ui| ui.arrives_at <= plan.wake_at) {
+            let input = UiInput { plane: ui.plane.as_input(), place: ui.place };
+            stream.core.set_ui(&input, ui.arrives_at)?;
+            last_ui = ui.arrives_at;
+            next_ui = uis.next().transpose()?;
         }
         while let Some((pose, later)) =
             poses.split_first().filter(|(pose, _)| pose.arrives_at <= plan.wake_at)

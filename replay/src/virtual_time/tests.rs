@@ -11,6 +11,7 @@ use crate::recording::memory::MemoryRecording;
 use crate::recording::plan::Plan;
 
 mod late_camera;
+mod ui_plane;
 
 /// What a replay showed.
 #[derive(PartialEq, Debug)]
@@ -61,7 +62,7 @@ fn replayed_plan(
     let mut digester = FrameDigester::default();
     let mut frames = Vec::new();
     let keys = timed_keys(recording, &reader, plan, timing);
-    let losses = replay(*reader.format(), &config, keys, |frame, picture| {
+    let losses = replay(*reader.format(), &config, keys, [], |frame, picture| {
         frames.push((*frame, digester.add(picture)));
         Ok(())
     })
@@ -209,7 +210,7 @@ fn refreshes_lie_where_the_recording_says() {
         };
         let keys = timed_keys(&mut recording, &reader, &plan, KeyTiming::AsRecorded);
         let mut shown = 0;
-        let losses = replay(*reader.format(), &config, keys, |frame, _| {
+        let losses = replay(*reader.format(), &config, keys, [], |frame, _| {
             let after = (frame.present_at - first).as_ns();
             assert_eq!(after % refresh_interval.as_ns(), expected, "{display_origin:?}");
             shown += 1;
@@ -236,7 +237,7 @@ fn an_error_of_the_sink_ends_the_replay() {
         finish: FinishConfig::default(),
     };
     let keys = timed_keys(&mut recording, &reader, &plan, KeyTiming::Stepped);
-    let result = replay(*reader.format(), &config, keys, |_, _| anyhow::bail!("disk full"));
+    let result = replay(*reader.format(), &config, keys, [], |_, _| anyhow::bail!("disk full"));
     assert!(result.unwrap_err().to_string().contains("disk full"));
 }
 

@@ -38,7 +38,7 @@ fn shown(late_cameras: Vec<TimedPose>, threads: usize) -> Vec<(OutputFrame, Stri
         Ok(key)
     });
     let (mut digester, mut frames) = (FrameDigester::default(), Vec::new());
-    replay(*reader.format(), &config, keys, |frame, picture| {
+    replay(*reader.format(), &config, keys, [], |frame, picture| {
         frames.push((*frame, digester.add(picture)));
         Ok(())
     })
