@@ -264,7 +264,8 @@ impl Engine {
                 |key: &&KeyFrame| key.motion_from.is_none() || !key.displacement.data().is_empty();
             let older = self.newest.as_ref().filter(|_| !key.is_cut).filter(is_known);
             let oldest = self.previous.as_ref().filter(is_known);
-            ladder.take_key(&self.pool, &mut key, older, oldest);
+            let flow = Some(&mut self.scratch.flow).filter(|_| !is_estimated);
+            ladder.take_key(&self.pool, flow, &mut key, older, oldest);
         }
         if !key.velocity.data().is_empty() {
             let cells = [key.velocity.width(), key.velocity.height()];

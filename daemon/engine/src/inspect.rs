@@ -39,6 +39,7 @@ impl Inspection<'_> {
             (Method::Global, _) => Rung::Global,
             (Method::Affine, _) => Rung::Affine,
             (Method::Quadratic, _) => Rung::Quadratic,
+            (Method::Flow, _) => Rung::Flow,
             (Method::World, Some(evidence)) => Rung::World(evidence.order()),
             (Method::Auto, Some(evidence)) if !evidence.samples().data().is_empty() => {
                 let depths = &self.key.depth;

@@ -32,7 +32,8 @@ pub enum Method {
     /// takes no notice of one.
     Flow,
     /// The ladder: for every surface the cheapest of `hold`, `global`, `linear`, `affine`,
-    /// `quadratic` and `world` that the last keys have shown to be good enough.
+    /// `quadratic` and `world` that the last keys have shown to be good enough, and `flow` where
+    /// motion does not explain them.
     Auto,
 }
 

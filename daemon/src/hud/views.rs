@@ -40,6 +40,7 @@ pub(super) fn rungs(inspection: Inspection<'_>, picture: &mut ColorPlane) {
             Rung::Affine => HUES[2],
             Rung::Quadratic => HUES[4],
             Rung::World(_) => HUES[1],
+            Rung::Flow => HUES[3],
         };
         let [red, green, blue] = color;
         ColorU8::from_rgba(red, green, blue, 255)

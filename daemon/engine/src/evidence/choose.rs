@@ -206,9 +206,10 @@ mod tests {
 
     const ORDER: CameraOrder = CameraOrder::Damped;
 
-    /// The score with these numbers for hold, global, linear, affine, quadratic and the worlds.
+    /// The score with these numbers for hold, global, linear, affine, quadratic and the worlds; flow
+    /// has nothing to say.
     fn score(of: [f32; 6]) -> PerRung {
-        [of[0], of[1], of[2], of[3], of[4], of[5], of[5], of[5]]
+        [of[0], of[1], of[2], of[3], of[4], of[5], of[5], of[5], of[2]]
     }
 
     fn in_use(score: &PerRung, rung: Rung) -> Rung {

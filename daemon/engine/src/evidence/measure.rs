@@ -7,12 +7,13 @@
 
 use rayon::ThreadPool;
 
-use super::{Lead, PerRung, RUNGS, STRIDE, Sample, index_of};
+use super::{Lead, PerRung, RUNGS, STRIDE, Sample, WORLD, index_of};
 use crate::bands::for_each_row_of_two;
 use crate::key::KeyFrame;
 use crate::lanes::LANES;
 use crate::plane::Plane;
 use crate::trajectory::camera_path::CameraOrder;
+use crate::trajectory::flow::FailedField;
 use crate::trajectory::ladder::Models;
 use crate::trajectory::lattice::Lattice;
 use crate::trajectory::quadratic::Quadratic;
@@ -27,10 +28,11 @@ const KEYS: u8 = 4;
 /// A rung with a larger (2) than this has failed: a fifth of a pixel.
 const FAILED: f32 = 0.01;
 
+/// (2) up to which flow has met the next key's: that of a pixel. Chance does not, from key to key.
+const FORESEEN: f32 = 0.2;
+
 const HOLD: usize = 0;
 const LINEAR: usize = 2;
-/// The first of the camera's orders.
-pub(super) const WORLD: usize = RUNGS.len() - CameraOrder::ALL.len();
 
 /// What the rungs said of the key before.
 #[derive(Debug)]
@@ -60,9 +62,20 @@ pub(super) struct Trace {
 /// Errors of the camera's orders over samples that move with the world, and their number.
 pub(super) type OrderSums = [f32; CameraOrder::ALL.len() + 1];
 
+/// What a key shows at a sample.
+struct Seen {
+    /// How far it came.
+    d: [f32; 2],
+    depth: u32,
+    /// Whether flow says so, and not the motion of the surface.
+    is_flow: bool,
+}
+
 /// What is measured beside the new key itself.
 pub(super) struct Measuring<'a> {
     pub(super) lattice: &'a Lattice,
+    /// Where its motion does not explain the key, and what does.
+    pub(super) failed: &'a FailedField,
     /// The samples of the key that the predictions were made for.
     pub(super) before: &'a Plane<Sample>,
     /// The rung of what has no history.
@@ -120,16 +133,18 @@ impl Measuring<'_> {
                 if !trace.needs_all {
                     continue;
                 }
-                let (d, _) = self.lattice.at(column, row);
+                let Seen { d, is_flow, .. } = self.seen(known, column, row);
                 let now = all_errors(known, trace.cell, d);
-                let moves_with_world = is_still(column, row);
-                // What the camera's poses explain is no jump of a surface, and no wrong vector.
-                if !moves_with_world {
+                let moves_with_world = !is_flow && is_still(column, row);
+                // What the camera's poses explain is no jump of a surface, and no wrong vector; and
+                // what flow does says nothing of the surface's own motion.
+                if !moves_with_world && !is_flow {
                     sample.share = share(d, trace.foreseen, &now);
                 }
                 self.take_in(sample, trace.cell, &now, |_| true);
                 if moves_with_world {
-                    for (sum, error) in sums[0].iter_mut().zip(&now[WORLD..]) {
+                    let of_orders = &now[WORLD..][..CameraOrder::ALL.len()];
+                    for (sum, error) in sums[0].iter_mut().zip(of_orders) {
                         *sum += error;
                     }
                     sums[0][CameraOrder::ALL.len()] += 1.0;
@@ -145,10 +160,23 @@ impl Measuring<'_> {
         total
     }
 
+    /// How what is seen at a sample has moved: by flow, where flow had said so a key before.
+    #[inline(always)]
+    fn seen(&self, predictions: &Predictions<'_>, column: u32, row: u32) -> Seen {
+        let (d, depth) = self.lattice.at(column, row);
+        let at = self.lattice.place(column, row);
+        let flow = self.failed.at(at).filter(|flow| {
+            let before = predictions.models.failed().at([at[0] - flow[0], at[1] - flow[1]]);
+            let foreseen = before.map(|[dx, dy]| [dx * predictions.phase, dy * predictions.phase]);
+            foreseen.is_some_and(|foreseen| error(foreseen, *flow) < FORESEEN)
+        });
+        Seen { d: flow.unwrap_or(d), depth, is_flow: flow.is_some() }
+    }
+
     /// Follows one sample back, and measures what costs little.
     #[inline(always)]
     fn follow(&self, predictions: &Predictions<'_>, column: u32, row: u32) -> (Sample, Trace) {
-        let (d, depth) = self.lattice.at(column, row);
+        let Seen { d, depth, .. } = self.seen(predictions, column, row);
         let mut sample = Sample { depth, ..Sample::default() };
         let mut trace = Trace::default();
         let at = self.lattice.place(column, row);

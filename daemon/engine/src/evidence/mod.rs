@@ -22,6 +22,11 @@
 //! something turns back, and a vector that is wrong for one key moves nothing. Wrong
 //! vectors that stay are found by luma ([`trust`]).
 //!
+//! A shadow, a reflection and a texture that runs move otherwise than the surface that shows them. Where
+//! luma says so of two keys in a row, and flow explains what their motion does not
+//! ([`crate::trajectory::flow`]), D is that flow, in all of the above: a sample then stands for what is
+//! seen there and not for the surface.
+//!
 //! What is not needed is not measured: `hold`, `linear` and the rung in use always, the others where
 //! that has failed, and in a sixteenth of the samples in turn. A richer rung that is not
 //! measured counts as good as the one in use, which has not failed; a cheaper one keeps its mean.
@@ -39,19 +44,19 @@ mod trust;
 use rayon::ThreadPool;
 
 pub use measure::Predictions;
-use measure::{Measuring, OrderSums, Trace, WORLD};
+use measure::{Measuring, OrderSums, Trace};
 use trust::Trust;
 
 use crate::key::KeyFrame;
 use crate::plane::Plane;
 use crate::trajectory::camera_path::CameraOrder;
-use crate::trajectory::lattice::Lattice;
+use crate::trajectory::ladder::Models;
 pub use crate::trajectory::lattice::STRIDE;
 use crate::trajectory::rung::Rung;
 use crate::trajectory::surface::is_same_surface;
 
 /// The rungs that are measured, cheapest first.
-pub const RUNGS: [Rung; 8] = [
+pub const RUNGS: [Rung; 9] = [
     Rung::Hold,
     Rung::Global,
     Rung::Linear,
@@ -60,7 +65,10 @@ pub const RUNGS: [Rung; 8] = [
     Rung::World(CameraOrder::Constant),
     Rung::World(CameraOrder::Damped),
     Rung::World(CameraOrder::Accelerated),
+    Rung::Flow,
 ];
+/// The place of the first of the camera's orders.
+const WORLD: usize = 5;
 /// A number per rung.
 pub type PerRung = [f32; RUNGS.len()];
 
@@ -74,7 +82,8 @@ pub const fn index_of(rung: Rung) -> usize {
         Rung::Linear => 2,
         Rung::Affine => 3,
         Rung::Quadratic => 4,
-        Rung::World(order) => 5 + order as usize,
+        Rung::World(order) => WORLD + order as usize,
+        Rung::Flow => 8,
     }
 }
 
@@ -183,22 +192,24 @@ impl Default for Evidence {
 }
 
 impl Evidence {
-    /// Takes in what `key`, whose field is that of `lattice`, shows of the `predictions` of the
-    /// key before it; None where there were none. `is_still` says which samples move with the world.
+    /// Takes in what `key`, whose `models` are new, shows of the `predictions` of the key before it;
+    /// None where there were none. `is_still` says which samples move with the world.
     pub fn update(
         &mut self,
         pool: &ThreadPool,
         key: &KeyFrame,
-        lattice: &Lattice,
+        models: &Models,
         predictions: Option<&mut Predictions<'_>>,
         is_still: impl Fn(u32, u32) -> bool + Sync,
         orders_alone: bool,
     ) {
+        let lattice = models.lattice();
         std::mem::swap(&mut self.samples, &mut self.older);
         self.count = self.count.wrapping_add(1);
         let turns = if orders_alone { ORDER_TURNS } else { TURNS };
         let measuring = Measuring {
             lattice,
+            failed: models.failed(),
             before: &self.older,
             image_rung: self.image_rung,
             turn: [turns, self.count % turns],
@@ -218,12 +229,12 @@ impl Evidence {
             None => measuring.begin(pool, &mut self.samples),
         }
         if !orders_alone {
-            self.choose_rungs(pool);
+            self.choose_rungs(pool, models);
         }
     }
 
     /// Gives every sample its rung.
-    fn choose_rungs(&mut self, pool: &ThreadPool) {
+    fn choose_rungs(&mut self, pool: &ThreadPool, models: &Models) {
         let Self { samples, leads, shared, trust, order, image_rung, .. } = self;
         *image_rung = choose::choose(pool, *order, *image_rung, samples, leads);
         // The next key's history.
@@ -235,7 +246,9 @@ impl Evidence {
         } else if trust.doubts() {
             for row in 0..leads.height() {
                 for (column, lead) in (0..).zip(leads.row_mut(row)) {
-                    if !trust.of(column, row) {
+                    let is_by_flow =
+                        lead.rung == Rung::Flow && models.flow_of(column, row).is_some();
+                    if !trust.of(column, row) && !is_by_flow {
                         *lead = Lead::by(Rung::Hold);
                     }
                 }
@@ -327,7 +340,7 @@ impl Evidence {
 
     /// Chooses the camera's order from the still samples that have just been measured.
     fn choose_order(&mut self, sums: &OrderSums) {
-        const ORDERS: usize = RUNGS.len() - WORLD;
+        const ORDERS: usize = CameraOrder::ALL.len();
         let count = sums[ORDERS];
         if count == 0.0 {
             return;

@@ -9,6 +9,7 @@ use crate::plane::Rect;
 use crate::testing::{plane, pool};
 use crate::time::{MonoSpan, MonoTime};
 use crate::trajectory::camera_path::between;
+use crate::trajectory::flow::Flow;
 use crate::trajectory::ladder::Ladder;
 
 const SIZE: [u32; 2] = [120, 88];
@@ -43,7 +44,7 @@ fn climbed(method: Method, keys: impl Iterator<Item = KeyFrame>) -> (Ladder, Key
     for mut key in keys {
         let [older, before] = [1, 2].map(|back| taken.len().checked_sub(back).map(|i| &taken[i]));
         let older = older.filter(|_| !key.is_cut);
-        ladder.take_key(&pool(2), &mut key, older, before);
+        ladder.take_key(&pool(2), None, &mut key, older, before);
         taken.push(key);
     }
     (ladder, taken.pop().unwrap())
@@ -264,4 +265,37 @@ fn a_camera_that_begins_to_move_is_believed_at_once() {
     let begins = |index: i64| camera(0.0, if index == 6 { 2.0 } else { 0.0 });
     let (_, last) = climbed(Method::Auto, seen(begins));
     assert!(last.velocity.at(60, 44).x.abs() > 32, "{:?}", last.velocity.at(60, 44));
+}
+
+#[test]
+fn what_runs_over_a_still_surface_is_followed_by_its_flow_and_the_rest_is_not() {
+    let is_screen = |x: u32, y: u32| (40..88).contains(&x) && (24..64).contains(&y);
+    let keys = (0..5).map(|index| {
+        let shows = |x: u32, y: u32| {
+            // Blocks of noise that run five pixels to the right per key.
+            let x = if is_screen(x, y) { x + 100 - 5 * index as u32 } else { x };
+            crate::testing::hash(x / 6, y / 6, 1) & 0xff
+        };
+        KeyFrame {
+            color: crate::color::ColorPlane::Rgba8(plane(SIZE[0], SIZE[1], |x, y| {
+                crate::color::Rgba8(0x01_01_01 * shows(x, y))
+            })),
+            ..key(index, |_, _| FAR, |x, y| [x as f32, y as f32])
+        }
+    });
+    let (mut ladder, mut flow) = (Ladder::new(Method::Auto, None).unwrap(), Flow::default());
+    let mut taken: Vec<KeyFrame> = Vec::new();
+    for mut key in keys {
+        let [older, before] = [1, 2].map(|back| taken.len().checked_sub(back).map(|i| &taken[i]));
+        ladder.take_key(&pool(2), Some(&mut flow), &mut key, older, before);
+        taken.push(key);
+    }
+    let newest = taken.pop().unwrap();
+    let moved = newest.velocity.at(64, 44);
+    assert!((moved.x - 160).abs() < 8 && moved.y.abs() < 8, "{moved:?}");
+    assert_eq!(rung(&ladder, 64, 44), Rung::Flow);
+    for (x, y) in [(8, 8), (110, 44), (64, 80)] {
+        assert_ne!(rung(&ladder, x, y), Rung::Flow);
+        assert_eq!(newest.velocity.at(x, y), crate::key::Velocity::default());
+    }
 }

@@ -16,6 +16,7 @@ use super::camera_path::{CameraOrder, CameraPath, Pose};
 use super::curve::Curve;
 use super::dilate_motion::dilate_cells;
 use super::fill::{Filling, Run};
+use super::flow::{FailedField, Flow};
 use super::global::Homography;
 use super::grid::Grid;
 use super::lattice::{Lattice, STRIDE, middle};
@@ -39,6 +40,8 @@ pub struct Models {
     affine: AffineField,
     /// By [`CameraOrder`].
     worlds: [Option<World>; CameraOrder::ALL.len()],
+    /// Where the key's motion does not explain its picture, and what does.
+    failed: FailedField,
     /// With the camera on its way to a late pose, which takes the place of every order.
     late: Option<World>,
 }
@@ -54,6 +57,18 @@ impl Models {
     #[must_use]
     pub fn lattice(&self) -> &Lattice {
         &self.lattice
+    }
+
+    /// Where the key's motion does not explain its picture, and what does.
+    #[must_use]
+    pub fn failed(&self) -> &FailedField {
+        &self.failed
+    }
+
+    /// The flow at a lattice point that the key's motion does not explain.
+    #[must_use]
+    pub fn flow_of(&self, column: u32, row: u32) -> Option<[f32; 2]> {
+        self.failed.at(self.lattice.place(column, row))
     }
 
     /// The affine maps that have been fitted.
@@ -126,6 +141,7 @@ impl Models {
             Rung::World(order) => {
                 self.world(order).map(|world| world.curve(key, older, grid, x, y))
             }
+            Rung::Flow => self.failed.at(grid.centre(x, y)).map(Curve::straight),
         };
         curve.filter(Curve::is_known)
     }
@@ -201,10 +217,12 @@ impl Ladder {
     }
 
     /// Gives `key` its trajectories. It was decoded with its displacement; `older` is the key before
-    /// it, unless this one is a cut, and `before` the one before that.
+    /// it, unless this one is a cut, and `before` the one before that. `flow` looks at the pictures where
+    /// motion was not estimated from them already.
     pub fn take_key(
         &mut self,
         pool: &ThreadPool,
+        flow: Option<&mut Flow>,
         key: &mut KeyFrame,
         older: Option<&KeyFrame>,
         before: Option<&KeyFrame>,
@@ -227,6 +245,10 @@ impl Ladder {
         let mut models = self.prepare(pool, key);
         if !matches!(self.choice, Choice::Always(_)) {
             let followed = older.filter(|older| key.motion_from == Some(older.content_time));
+            let is_evidence = self.choice == Choice::Evidence;
+            if let Some((flow, older)) = flow.zip(followed).filter(|_| is_evidence) {
+                flow.find_failed(pool, key, older, &mut models.failed);
+            }
             self.weigh(pool, key, &models, followed, before);
         }
         if self.evidence.is_cut() {
@@ -302,7 +324,7 @@ impl Ladder {
             world.is_some_and(|world| world.is_still(key, &new.grid, x, y))
         };
         let orders_alone = self.choice == Choice::World;
-        self.evidence.update(pool, key, &new.lattice, predictions.as_mut(), is_still, orders_alone);
+        self.evidence.update(pool, key, new, predictions.as_mut(), is_still, orders_alone);
     }
 
     /// Works out what the rungs need of `key`, but for the affine maps.
@@ -312,6 +334,7 @@ impl Ladder {
         models.grid = Grid::of(key);
         models.lattice.update(pool, key, &models.grid);
         models.affine.clear(&models.lattice);
+        models.failed.clear();
         let uses_global = match self.choice {
             Choice::Always(rung) => rung == Rung::Global,
             Choice::World => false,

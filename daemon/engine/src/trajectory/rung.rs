@@ -18,4 +18,6 @@ pub enum Rung {
     Quadratic,
     /// It is seen by a camera that goes on.
     World(CameraOrder),
+    /// It goes on by what the last two pictures show of it, where its motion does not explain them.
+    Flow,
 }

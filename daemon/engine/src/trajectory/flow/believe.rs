@@ -8,7 +8,7 @@ use crate::plane::Plane;
 
 /// Steps of luma that every pixel of a block may differ by without anything having moved: dither, noise,
 /// the rounding of an encoder.
-const NOISE: u32 = 2 * 64;
+pub(super) const NOISE: u32 = 2 * 64;
 /// Part of what standing still leaves of (1) that may be left, in quarters.
 const WORTH_QUARTERS: u32 = 3;
 

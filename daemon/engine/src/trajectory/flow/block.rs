@@ -20,6 +20,23 @@ pub(super) fn sad(now: &Level, a: [i32; 2], then: &Level, b: [i32; 2]) -> u32 {
     sum
 }
 
+/// (1) without the mean difference: what a change of light leaves.
+#[inline(always)]
+pub(super) fn sad_in_any_light(now: &Level, a: [i32; 2], then: &Level, b: [i32; 2]) -> u32 {
+    const SIDE: usize = BLOCK as usize;
+    let mut differences = [[0_i16; SIDE]; SIDE];
+    for (y, differences) in (0..).zip(&mut differences) {
+        let now = now.run::<SIDE>(a[0], a[1] + y);
+        let then = then.run::<SIDE>(b[0], b[1] + y);
+        for (difference, (now, then)) in differences.iter_mut().zip(now.iter().zip(then)) {
+            *difference = i16::from(*now) - i16::from(*then);
+        }
+    }
+    let sum: i16 = differences.as_flattened().iter().sum();
+    let mean = (sum + PIXELS as i16 / 2) >> 6;
+    differences.as_flattened().iter().map(|d| u32::from((d - mean).unsigned_abs())).sum()
+}
+
 /// Sum over a block of the difference from its mean.
 pub(super) fn contrast(level: &Level, at: [i32; 2]) -> u32 {
     let rows =

@@ -54,6 +54,22 @@ impl Level {
         self.plane.row(y)[x..].first_chunk().expect("blocks stay within the margin")
     }
 
+    /// Luma in sixteenths at a place in Q8 pixels, between four; None outside the picture.
+    #[inline(always)]
+    pub(super) fn sample(&self, [x, y]: [i32; 2]) -> Option<i32> {
+        let is_in = |at: i32, axis: usize| (0..=(self.size[axis] - 1).cast_signed()).contains(&at);
+        let (column, row) = (x >> 8, y >> 8);
+        if !is_in(column, 0) || !is_in(row, 1) {
+            return None;
+        }
+        let (fx, fy) = (x & 0xff, y & 0xff);
+        let across = |row: i32| {
+            let [left, right] = *self.run::<2>(column, row);
+            i32::from(left) * (256 - fx) + i32::from(right) * fx
+        };
+        Some(((across(row) >> 4) * (256 - fy) + (across(row + 1) >> 4) * fy) >> 8)
+    }
+
     fn resize(&mut self, size: [u32; 2]) {
         self.size = size;
         self.plane.resize(size[0] + 2 * MARGIN, size[1] + 2 * MARGIN);
@@ -118,7 +134,7 @@ pub(super) struct Pyramid {
 }
 
 impl Pyramid {
-    /// Makes these the levels of `key`, whose valid rectangle is at least two blocks in size.
+    /// Makes the finest of these that of `key`, whose valid rectangle is at least two blocks in size.
     pub(super) fn update(&mut self, pool: &ThreadPool, key: &KeyFrame) {
         self.levels.resize_with(HALVINGS + 1, Level::default);
         let finest = &mut self.levels[0];
@@ -128,6 +144,13 @@ impl Pyramid {
             ColorPlane::Rgba16f(color) => finest.take(pool, color, key.valid),
         }
         self.count = 1;
+    }
+
+    /// Makes the others, if they are not there yet.
+    pub(super) fn complete(&mut self, pool: &ThreadPool) {
+        if self.count > 1 {
+            return;
+        }
         for index in 1..self.levels.len() {
             let (finer, coarser) = self.levels.split_at_mut(index);
             let finer = &finer[index - 1];
@@ -139,7 +162,7 @@ impl Pyramid {
         }
     }
 
-    /// The levels, the finest first.
+    /// The levels that were made, the finest first.
     pub(super) fn levels(&self) -> &[Level] {
         &self.levels[..self.count]
     }

@@ -13,13 +13,16 @@
 //! surroundings. It is believed only where it explains the block, so that whoever goes by it is
 //! hardly ever worse off than with a picture that stands still ([`believe`]).
 //!
-//! The answer is given on cells of 4x4 pixels, each with the motion of that block around it that fits
-//! it best. Integers alone, every block for itself: the number of threads changes nothing.
+//! Where a key has no motion the answer is given on cells of 4x4 pixels, each with the motion of that
+//! block around it that fits it best. Where it has, only those blocks are searched that its own motion
+//! fails to explain ([`failed`]): what moves over a surface, or is seen in it. Integers alone, every block for itself: the number of threads changes nothing.
 
 mod believe;
 mod block;
 mod cells;
+mod failed;
 mod luma;
+mod own;
 mod search;
 mod subpixel;
 #[cfg(test)]
@@ -31,7 +34,10 @@ use crate::key::KeyFrame;
 use crate::plane::Plane;
 use crate::time::MonoTime;
 use cells::Cells;
+pub use failed::FailedField;
+use failed::Failing;
 use luma::Pyramid;
+use own::Own;
 use search::Search;
 
 /// Pixels of a block, per axis.
@@ -53,12 +59,54 @@ pub struct Flow {
     newest_of: Option<MonoTime>,
     search: Search,
     cells: Cells,
+    failing: Failing,
 }
 
 impl Flow {
     /// Finds how the picture of `newest` moved since `older`, the key before it. Returns false where
     /// the two cannot be compared, or have too little in common to tell: nothing is known then.
     pub fn find(&mut self, pool: &ThreadPool, newest: &KeyFrame, older: &KeyFrame) -> bool {
+        if !self.take_pictures(pool, newest, older) {
+            return false;
+        }
+        self.newest.complete(pool);
+        self.older.complete(pool);
+        self.search.find(pool, &self.newest, &self.older, None);
+        self.search.believe(pool, &self.newest, &self.older);
+        if !self.search.is_believable() {
+            return false;
+        }
+        self.cells.choose(pool, [self.newest.finest(), self.older.finest()], &self.search);
+        true
+    }
+
+    /// Finds in `found` where the motion of `newest`, which points back to `older`, does not explain its
+    /// picture, and what does. Little work where it does everywhere.
+    pub fn find_failed(
+        &mut self,
+        pool: &ThreadPool,
+        newest: &KeyFrame,
+        older: &KeyFrame,
+        found: &mut FailedField,
+    ) {
+        found.clear();
+        if !self.take_pictures(pool, newest, older) {
+            return;
+        }
+        let Self { newest: now, older: then, search, failing, .. } = self;
+        let own = Own::new(newest, older);
+        if !failing.mark(pool, &own, [now.finest(), then.finest()]) {
+            return;
+        }
+        now.complete(pool);
+        then.complete(pool);
+        failing.spread(now.levels());
+        search.find(pool, now, then, Some(failing.wanted()));
+        failing.keep(pool, &own, [now.finest(), then.finest()], search, found);
+    }
+
+    /// Has luma of both keys. Returns false where the two cannot be compared.
+    fn take_pictures(&mut self, pool: &ThreadPool, newest: &KeyFrame, older: &KeyFrame) -> bool {
         let is_in = |key: &KeyFrame| key.valid.fits(key.color.width(), key.color.height());
         let is_alike = newest.valid == older.valid
             && newest.color.format() == older.color.format()
@@ -75,11 +123,6 @@ impl Flow {
         }
         self.newest.update(pool, newest);
         self.newest_of = Some(newest.content_time);
-        self.search.find(pool, &self.newest, &self.older);
-        if !self.search.is_believable() {
-            return false;
-        }
-        self.cells.choose(pool, [self.newest.finest(), self.older.finest()], &self.search);
         true
     }
 

@@ -43,21 +43,36 @@ pub(super) struct Block {
 }
 
 impl Search {
-    /// Finds where every block of `now` was in `then`, which has its size.
-    pub(super) fn find(&mut self, pool: &ThreadPool, now: &Pyramid, then: &Pyramid) {
-        let levels = now.levels().iter().zip(then.levels()).rev();
-        for (number, (now, then)) in levels.enumerate() {
+    /// Finds where every block of `now` was in `then`, which has its size, to a whole pixel. `wanted`
+    /// says which blocks of each level, the finest first; the others count as still.
+    pub(super) fn find(
+        &mut self,
+        pool: &ThreadPool,
+        now: &Pyramid,
+        then: &Pyramid,
+        wanted: Option<&[Plane<bool>]>,
+    ) {
+        let levels = now.levels().iter().zip(then.levels()).enumerate().rev();
+        let coarsest = now.levels().len() - 1;
+        for (number, (now, then)) in levels {
             std::mem::swap(&mut self.found, &mut self.coarser);
             let Self { found, first, coarser, .. } = self;
             let level = Pair { now, then };
-            let coarser = (number > 0).then_some(&*coarser);
-            level.each_block(pool, first, |block| match coarser {
-                None => level.search(block),
-                Some(coarser) => level.follow(block, coarser),
+            let is_wanted = |[x, y]: [u32; 2]| wanted.is_none_or(|wanted| wanted[number].at(x, y));
+            level.each_block(pool, first, |block| match number {
+                _ if !is_wanted(block) => [0; 2],
+                number if number == coarsest => level.search(block),
+                _ => level.follow(block, coarser),
             });
             let first = &*first;
-            level.each_block(pool, found, |block| level.agree(block, first));
+            level.each_block(pool, found, |block| {
+                if is_wanted(block) { level.agree(block, first) } else { [0; 2] }
+            });
         }
+    }
+
+    /// Takes what was found on below a pixel, and says what is to be thought of it.
+    pub(super) fn believe(&mut self, pool: &ThreadPool, now: &Pyramid, then: &Pyramid) {
         let level = Pair { now: now.finest(), then: then.finest() };
         let found = &self.found;
         level.each_block(pool, &mut self.blocks, |block| {
@@ -68,6 +83,11 @@ impl Search {
             believe(level.now, at, step, error, still)
         });
         self.is_believable = super::believe::is_believable(&self.blocks);
+    }
+
+    /// Of every block of the picture, whole pixels.
+    pub(super) fn found(&self) -> &Plane<Step> {
+        &self.found
     }
 
     /// Of every block of the picture.
@@ -96,6 +116,7 @@ struct Best {
 }
 
 impl Pair<'_> {
+    /// Makes `plane` what `of` gives for every block.
     fn each_block<T: Copy + Default + Send>(
         &self,
         pool: &ThreadPool,

@@ -11,6 +11,7 @@
 //! more of (1) is not taken.
 
 use super::luma::Level;
+use super::own::{Mask, in_any_light};
 use super::{BLOCK, PER_PX, Step};
 
 /// Steps of (4).
@@ -19,6 +20,9 @@ const ITERATIONS: usize = 3;
 const DAMPING: i64 = 64 * 16;
 /// Least of D to a side in one step, and farthest away from where it began, Q8 pixels.
 const MOST: i32 = 256;
+
+/// A step of the answer in Q8.
+const Q8_STEP: i32 = 256 / PER_PX as i32;
 
 const SIDE: usize = BLOCK as usize;
 
@@ -78,6 +82,12 @@ fn error(r: &[[i32; SIDE]; SIDE]) -> u32 {
     r.as_flattened().iter().map(|r| r.unsigned_abs()).sum::<u32>() >> 4
 }
 
+/// What `step`, which [`refine`] found, leaves of (1), without the mean, where the block at `at` counts.
+pub(super) fn error_of([now, then]: [&Level; 2], at: [i32; 2], step: Step, counts: &Mask) -> u32 {
+    let r = Template::new(now, at).residual(then, at, step.map(|d| i32::from(d) * Q8_STEP));
+    in_any_light(&r, counts)
+}
+
 /// Takes the block at `at` from `step` whole pixels on to 1/32 pixels, and says what of (1) is left.
 pub(super) fn refine([now, then]: [&Level; 2], at: [i32; 2], step: Step) -> (Step, u32) {
     let start = step.map(|d| i32::from(d) << 8);
@@ -115,11 +125,10 @@ pub(super) fn refine([now, then]: [&Level; 2], at: [i32; 2], step: Step) -> (Ste
         }
         (d, r, left) = (next, rest, error);
     }
-    let shift = 256 / i32::from(PER_PX);
     #[expect(
         clippy::cast_possible_truncation,
         reason = "the reach of all levels is below 1023 pixels"
     )]
-    let steps = d.map(|d| (d + shift / 2).div_euclid(shift) as i16);
+    let steps = d.map(|d| (d + Q8_STEP / 2).div_euclid(Q8_STEP) as i16);
     (steps, left)
 }

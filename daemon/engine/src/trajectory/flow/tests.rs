@@ -53,7 +53,7 @@ fn errors(field: &Plane<[f32; 2]>, d: [f32; 2], inside: u32) -> Vec<f32> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
     #[test]
-    fn a_picture_that_slides_is_followed_to_a_quarter_of_a_pixel(
+    fn a_picture_that_slides_is_followed_below_a_pixel(
         d in prop::array::uniform2(-24.0_f32..24.0),
     ) {
         let size = [160, 120];
@@ -62,8 +62,8 @@ proptest! {
         let field = found(2, &older, &newest).unwrap();
         // Here and there a block has texture along one axis alone.
         let errors = errors(&field, d, 10);
-        let (most, all) = (errors[errors.len() * 9 / 10], errors[errors.len() - 1]);
-        prop_assert!(most < 0.25 && all < 2.0, "{d:?} is missed by {most} px, at worst {all} px");
+        let (half, most) = (errors[errors.len() / 2], errors[errors.len() * 9 / 10]);
+        prop_assert!(half < 0.125 && most < 0.75, "{d:?} is missed by {half} px, {most} px");
     }
 }
 
@@ -145,4 +145,68 @@ fn every_format_of_color_is_followed() {
         let errors = errors(&field, [5.0, 0.0], 5);
         assert!(errors[errors.len() * 9 / 10] < 0.25, "{format:?}");
     }
+}
+
+/// The motion of what stands still, but for cells where `moves` says otherwise.
+fn with_motion(key: KeyFrame, moves: impl Fn(u32, u32) -> [f32; 2]) -> KeyFrame {
+    let displacement = plane(key.valid.width / 2, key.valid.height / 2, moves);
+    KeyFrame { displacement, ..key }
+}
+
+fn failed(older: &KeyFrame, newest: &KeyFrame) -> FailedField {
+    let mut found = FailedField::default();
+    Flow::default().find_failed(&pool(2), newest, older, &mut found);
+    found
+}
+
+/// A screen at 40 to 104 by 40 to 88 whose picture has run `at` pixels to the right, in a still wall.
+fn screen(at: f32) -> impl Fn(f32, f32) -> f32 {
+    move |x, y| {
+        let is_screen = (40.0..104.0).contains(&x) && (40.0..88.0).contains(&y);
+        smooth(if is_screen { x - at } else { x }, y, 4)
+    }
+}
+
+#[test]
+fn flow_is_found_where_motion_does_not_explain_the_picture_and_there_alone() {
+    let size = [160, 120];
+    let still = |_, _| [0.0; 2];
+    let keys = [0.0, 6.0].map(|at| with_motion(key_of(at as i64, size, screen(at)), still));
+    let found = failed(&keys[0], &keys[1]);
+    for (x, y) in [(60.0, 60.0), (80.0, 50.0), (52.0, 76.0)] {
+        let [dx, dy] = found.at([x, y]).unwrap();
+        assert!((dx - 6.0).abs() < 0.25 && dy.abs() < 0.25, "{dx}, {dy}");
+    }
+    for (x, y) in [(8.0, 8.0), (130.0, 60.0), (60.0, 110.0), (20.0, 60.0)] {
+        assert_eq!(found.at([x, y]), None);
+    }
+    assert!(failed(&keys[0], &keys[0]).is_empty());
+}
+
+#[test]
+fn motion_that_explains_the_picture_is_left_alone_in_any_light_and_at_outlines() {
+    let size = [160, 120];
+    let slides = |x: u32, _| if (20..52).contains(&x) { [6.0, 0.0] } else { [0.0; 2] };
+    let board = |at: f32, light: f32| {
+        move |x: f32, y: f32| {
+            let is_board = (34.0 + at..98.0 + at).contains(&x);
+            light * smooth(if is_board { x - at } else { x + 300.0 }, y, 4)
+        }
+    };
+    let depth = |x: u32, _| if (20..52).contains(&x) { 2_000_000 } else { 1_000_000 };
+    let keys = [(0.0, 1.0), (6.0, 1.0), (6.0, 0.9)].map(|(at, light)| {
+        let shift = (at / 2.0) as u32;
+        KeyFrame {
+            depth: plane(size[0] / 2, size[1] / 2, |x, y| depth(x + 3 - shift, y)),
+            ..with_motion(key_of(at as i64, size, board(at, light)), slides)
+        }
+    });
+    let [before, after, darker] = keys;
+    assert!(failed(&before, &after).is_empty());
+    let found = failed(&before, &darker);
+    let places = (0..20).flat_map(|x| (0..15).map(move |y| [8 * x + 4, 8 * y + 4]));
+    let count = places.filter(|place| found.at(place.map(|i| i as f32)).is_some()).count();
+    assert!(count <= 3, "{count} blocks");
+    let wrong = with_motion(after.clone(), |_, _| [-6.0, 0.0]);
+    assert!(!failed(&before, &wrong).is_empty(), "wrong motion does not pass");
 }

@@ -1,0 +1,224 @@
+//! Where a key's own motion does not explain its picture, and flow does.
+//!
+//! A block of the key is looked at by the motion of the cells at its centre and near its corners first:
+//! most are explained by one of them. What is not is looked at pixel by pixel ([`own`]), by the motion of
+//! each and but for those that were hidden before, as outlines may run through it:
+//!
+//! ```text
+//! (5) failed    where SAD(D) > NOISE + contrast / 4
+//! (6) explained where SAD(F) < SAD(D) / 2 and SAD(F) < NOISE + contrast / 4    F what is found then
+//! (7) kept      where F is that of two blocks beside it, to a pixel
+//! ```
+//!
+//! with SAD less the mean difference, so that light may change.
+//!
+//! What is left out is nothing that moves as a whole: of it nothing is said.
+
+use rayon::ThreadPool;
+
+use super::believe::NOISE;
+use super::block::{contrast, sad, sad_in_any_light};
+use super::luma::Level;
+use super::own::Own;
+use super::search::Search;
+use super::subpixel::{error_of, refine};
+use super::{BLOCK, PER_PX, Step};
+use crate::bands::for_each_chunk;
+use crate::plane::{Plane, Rect};
+
+/// Of a block that its key's motion explains, or nothing does.
+const NONE: Step = [i16::MIN; 2];
+
+/// Flow of the blocks that a key's own motion does not explain.
+#[derive(Clone, Debug, Default)]
+pub struct FailedField {
+    /// Empty where there are none.
+    blocks: Plane<Step>,
+    valid: Rect,
+}
+
+impl FailedField {
+    /// Knows of none.
+    pub fn clear(&mut self) {
+        self.blocks.resize(0, 0);
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.blocks.data().is_empty()
+    }
+
+    /// The flow at a place, pixels: newer minus older position. None where the key's motion explains
+    /// the picture, or flow does not.
+    #[must_use]
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "clamped to the picture")]
+    #[expect(clippy::cast_sign_loss, reason = "clamped to the picture")]
+    pub fn at(&self, [x, y]: [f32; 2]) -> Option<[f32; 2]> {
+        if self.is_empty() {
+            return None;
+        }
+        let block = |place: f32, start: u32, blocks: u32| {
+            ((place + 0.5 - start as f32).max(0.0) as u32 / BLOCK).min(blocks - 1)
+        };
+        let column = block(x, self.valid.x, self.blocks.width());
+        let row = block(y, self.valid.y, self.blocks.height());
+        let step = self.blocks.row(row)[column as usize];
+        (step != NONE).then(|| step.map(|d| f32::from(d) / f32::from(PER_PX)))
+    }
+}
+
+/// Buffers of the search for them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Failing {
+    /// The blocks of each level that are searched, the finest first.
+    wanted: Vec<Plane<bool>>,
+    /// What (6) leaves.
+    explained: Plane<Step>,
+}
+
+impl Failing {
+    /// Which blocks of each level are to be searched, the finest first.
+    pub(super) fn wanted(&self) -> &[Plane<bool>] {
+        &self.wanted
+    }
+
+    /// Marks the blocks that have failed (5); false if none has.
+    pub(super) fn mark(&mut self, pool: &ThreadPool, own: &Own<'_>, levels: [&Level; 2]) -> bool {
+        if self.wanted.is_empty() {
+            self.wanted.push(Plane::default());
+        }
+        let marks = &mut self.wanted[0];
+        let [columns, rows] = levels[0].blocks();
+        marks.resize(columns, rows);
+        for_each_chunk(
+            pool,
+            marks.data_mut(),
+            columns as usize,
+            #[inline(always)]
+            |y, row| {
+                for (x, mark) in (0..).zip(row) {
+                    *mark = has_failed(own, levels, [x, y]);
+                }
+            },
+        );
+        marks.data().contains(&true)
+    }
+
+    /// Marks the blocks of the coarser levels that hold marked ones.
+    pub(super) fn spread(&mut self, levels: &[Level]) {
+        self.wanted.resize_with(levels.len().max(self.wanted.len()), Plane::default);
+        for index in 1..levels.len() {
+            let (finer, coarser) = self.wanted.split_at_mut(index);
+            let (finer, coarser) = (&finer[index - 1], &mut coarser[0]);
+            let [columns, rows] = levels[index].blocks();
+            coarser.resize(columns, rows);
+            coarser.data_mut().fill(false);
+            for y in 0..finer.height() {
+                for (x, _) in (0..).zip(finer.row(y)).filter(|(_, mark)| **mark) {
+                    coarser.row_mut((y / 2).min(rows - 1))[(x / 2).min(columns - 1) as usize] =
+                        true;
+                }
+            }
+        }
+    }
+
+    /// Keeps in `found` what of `search` explains a marked block, (6) and (7).
+    pub(super) fn keep(
+        &mut self,
+        pool: &ThreadPool,
+        own: &Own<'_>,
+        levels: [&Level; 2],
+        search: &Search,
+        found: &mut FailedField,
+    ) {
+        let Self { wanted, explained, .. } = self;
+        let marks = &wanted[0];
+        let size = [marks.width(), marks.height()];
+        explained.resize(size[0], size[1]);
+        for_each_chunk(
+            pool,
+            explained.data_mut(),
+            size[0] as usize,
+            #[inline(always)]
+            |y, row| {
+                for ((x, step), marked) in (0..).zip(row).zip(marks.row(y)) {
+                    *step = NONE;
+                    if !marked {
+                        continue;
+                    }
+                    let at = start(levels[0], [x, y]);
+                    let seen = own.seen(levels, at);
+                    let (flow, _) = refine(levels, at, search.found().at(x, y));
+                    let error = error_of(levels, at, flow, &seen.mask);
+                    if 2 * error < seen.error && error < NOISE + contrast(levels[0], at) / 4 {
+                        *step = flow;
+                    }
+                }
+            },
+        );
+        let explained = &*explained;
+        found.valid = own.valid();
+        found.blocks.resize(size[0], size[1]);
+        for_each_chunk(
+            pool,
+            found.blocks.data_mut(),
+            size[0] as usize,
+            #[inline(always)]
+            |y, row| {
+                for (x, step) in (0..).zip(row) {
+                    *step = if has_company(explained, [x, y]) { explained.at(x, y) } else { NONE };
+                }
+            },
+        );
+    }
+}
+
+/// (7).
+#[inline(always)]
+fn has_company(explained: &Plane<Step>, [x, y]: [u32; 2]) -> bool {
+    let own = explained.at(x, y);
+    if own == NONE {
+        return false;
+    }
+    let last = [explained.width() - 1, explained.height() - 1];
+    let is_alike = |other: Step| {
+        let near = PER_PX.unsigned_abs();
+        other != NONE && own[0].abs_diff(other[0]) <= near && own[1].abs_diff(other[1]) <= near
+    };
+    let mut count = 0;
+    for y in y.saturating_sub(1)..=(y + 1).min(last[1]) {
+        for x in x.saturating_sub(1)..=(x + 1).min(last[0]) {
+            count += u32::from(is_alike(explained.at(x, y)));
+        }
+    }
+    // Itself and two more.
+    count > 2
+}
+
+/// (5).
+#[inline(always)]
+fn has_failed(own: &Own<'_>, [now, then]: [&Level; 2], block: [u32; 2]) -> bool {
+    let at = start(now, block);
+    let from = |d: [i32; 2]| {
+        let from = [0, 1].map(|axis| at[axis] - ((d[axis] + 128) >> 8));
+        then.has_block(from).then_some(from)
+    };
+    // Most blocks end here.
+    let centre = from(own.at_centre(at));
+    if centre.is_none_or(|from| sad(now, at, then, from) <= NOISE) {
+        return false;
+    }
+    let most = NOISE + contrast(now, at) / 4;
+    let fails = |from: Option<[i32; 2]>| {
+        from.is_some_and(|from| sad_in_any_light(now, at, then, from) > most)
+    };
+    fails(centre)
+        && own.near_corners(at).into_iter().all(|d| fails(from(d)))
+        && own.seen([now, then], at).error > most
+}
+
+fn start(level: &Level, block: [u32; 2]) -> [i32; 2] {
+    [level.start_of(block[0], 0), level.start_of(block[1], 1)]
+}
