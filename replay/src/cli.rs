@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    adapters, bench, completions, ctl, demo, export, import, info, man, pacing, perception, replay,
-    scenes, score, serve, stability, top,
+    adapters, bench, completions, ctl, demo, doctor, export, import, info, man, pacing, perception,
+    replay, scenes, score, serve, stability, top,
 };
 use crate::output::Output;
 use foreframed::UsageError;
@@ -43,6 +43,8 @@ pub enum Command {
     Export(export::Args),
     /// Say what a capture holds and whether it is whole.
     Info(info::Args),
+    /// Look for what is wrong with a capture: its motion, and the bits of its colour.
+    Doctor(doctor::Args),
     /// Feed a capture through the engine and the pacer, on virtual time.
     Replay(replay::Args),
     /// Predict left-out frames of captures and measure how far off the methods are.
@@ -96,6 +98,7 @@ impl Cli {
             Command::Import(args) => import::run(&args, &output),
             Command::Export(args) => export::run(&args, &output),
             Command::Info(args) => info::run(&args, &output),
+            Command::Doctor(args) => doctor::run(&args, &output),
             Command::Replay(args) => replay::run(&args, &output),
             Command::Score(args) => score::run(&args, &output),
             Command::Stability(args) => stability::run(&args, &output),

@@ -8,6 +8,7 @@ pub mod bench;
 pub mod cli;
 pub mod commands;
 pub mod demo;
+pub mod doctor;
 pub mod exr_frames;
 pub mod html;
 pub mod options;

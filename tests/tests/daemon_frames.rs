@@ -213,6 +213,58 @@ fn a_recording_holds_the_poses_that_led_pictures() {
     assert!((arrivals[0]..=arrivals[1]).contains(&found.arrived_at_ns), "{arrivals:?}");
 }
 
+#[test]
+fn a_client_whose_motion_is_flipped_is_told_and_one_whose_motion_is_right_is_not() {
+    let mut daemon = RunningDaemon::start("null");
+    let said = [1.0, -1.0].map(|sign| {
+        let mut client = daemon.connect();
+        let motion = MotionConvention {
+            format: MotionFormat::Rg32f,
+            direction: MotionDirection::PreviousToCurrent,
+            unit: MotionUnit::Pixels,
+            scale: [1.0, sign],
+            camera_motion: CameraMotion::Included,
+        };
+        let format = StreamFormat { motion: Some(motion), ..StreamFormat::rgba8(64, 48) };
+        let mut source = client.open_stream_of(1, format);
+        let mut before = None;
+        for key in 0..16_u32 {
+            let mut submit = source.fill(RED);
+            let place = |kind| source.layout().get(kind).unwrap().offset as usize;
+            let (color, vectors) = (place(PlaneKind::Color), place(PlaneKind::Motion));
+            let slot = &mut source.slots[submit.slot as usize];
+            for (i, pixel) in slot[color..][..64 * 48 * 4].chunks_exact_mut(4).enumerate() {
+                // Blotches of 3x3 that move 3 pixels down from key to key.
+                let (x, y) = (i as u32 % 64 / 3, (i as u32 / 64 + 300 - 3 * key) / 3);
+                let level = (x * 73 + y * 151).wrapping_mul(2_654_435_761).to_le_bytes()[3];
+                pixel.copy_from_slice(&[level, level, level, 255]);
+            }
+            for vector in slot[vectors..][..64 * 48 * 8].chunks_exact_mut(8) {
+                vector.copy_from_slice([0.0_f32, 3.0].map(f32::to_le_bytes).as_flattened());
+            }
+            submit.motion_from_ns = before.replace(submit.content_time_ns);
+            client.send(submit);
+            client.expect_released(&submit);
+        }
+        daemon_says(client)
+    });
+    daemon.stop();
+    let [right, flipped] = said;
+    assert_eq!(right, None);
+    let told = flipped.expect("a word about motion");
+    assert_eq!((told.code, told.is_fatal, &*told.field), (ErrorCode::Content, false, "motion"));
+    assert!(told.found.contains("y-flipped"), "{}", told.found);
+}
+
+/// The first error that a client that leaves was told.
+fn daemon_says(mut client: Client) -> Option<ErrorMessage> {
+    client.send(Goodbye { reason: EndReason::Asked });
+    client.read_to_end().into_iter().find_map(|message| match message {
+        DaemonMessage::Error(error) => Some(error),
+        _ => None,
+    })
+}
+
 /// Sends a UI plane of one colour, 3x2 at column 4 and row 1, from a slot that no key uses now.
 fn submit_ui(
     client: &mut Client,

@@ -13,6 +13,7 @@ use crate::backend::gpu::Gpu;
 use crate::backend::{BackendStatus, FrameInput};
 use crate::color::ColorPlane;
 use crate::decode::{DecodeError, DecodeScratch, decode_key};
+use crate::diagnosis::MotionCheck;
 use crate::evidence::Evidence;
 use crate::field::FieldMap;
 use crate::finish::{Finish, FinishConfig};
@@ -38,6 +39,8 @@ pub struct EngineConfig {
     pub pixels_per_degree: Option<f32>,
     /// Whether detail moves from in-between frames to their keys. On its own it is off.
     pub finish: FinishConfig,
+    /// How many keys that move are looked at, from the first on, for what is wrong with their motion.
+    pub keys_to_check: u32,
     /// Which ways through the kernels are taken. The result does not depend on it.
     pub simd: Simd,
     /// Runs on each worker thread when it starts, for a priority that the engine knows nothing of.
@@ -47,8 +50,8 @@ pub struct EngineConfig {
 }
 
 impl EngineConfig {
-    /// Makes frames by `method` on `threads`: undamped, not finished, by the widest registers, without asking for
-    /// priority, and with a timer that stands still.
+    /// Makes frames by `method` on `threads`: undamped, not finished, unchecked, by the widest registers,
+    /// without asking for priority, and with a timer that stands still.
     #[must_use]
     pub fn new(method: Method, threads: NonZeroUsize) -> Self {
         Self {
@@ -56,6 +59,7 @@ impl EngineConfig {
             threads,
             pixels_per_degree: None,
             finish: FinishConfig::default(),
+            keys_to_check: 0,
             simd: Simd::Widest,
             worker_started: || (),
             timer: || MonoTime::ZERO,
@@ -129,6 +133,7 @@ pub struct Engine {
     /// Of streams whose pictures are finished.
     finish: Option<Finish>,
     ui: UiLayer,
+    check: MotionCheck,
 }
 
 /// Buffers of the steps, kept from frame to frame.
@@ -155,6 +160,7 @@ impl Engine {
             backend: Backend::default(),
             finish: Finish::new(&format, &config.finish, config.pixels_per_degree),
             ui: UiLayer::default(),
+            check: MotionCheck::new(&format, config.keys_to_check),
         }
     }
 
@@ -206,6 +212,12 @@ impl Engine {
         self.newest.as_ref().map(|key| (key, &self.scratch.map, evidence))
     }
 
+    /// What was found of the client's motion so far.
+    #[must_use]
+    pub fn motion_check(&self) -> &MotionCheck {
+        &self.check
+    }
+
     /// What the stream declared.
     #[must_use]
     pub fn format(&self) -> &StreamFormat {
@@ -246,6 +258,10 @@ impl Engine {
             &mut self.spare,
         )?;
         let mut key = std::mem::take(&mut self.spare);
+        if let Some(older) = self.newest.as_ref().filter(|_| key.motion_from.is_some()) {
+            let displacement = self.scratch.decode.displacement();
+            self.check.look(&self.format, &key, displacement, older);
+        }
         let has_none = key.motion_from.is_none() && !key.is_cut;
         let is_estimated = has_none && self.estimate_motion(&mut key);
         let motion = match key.motion_from {

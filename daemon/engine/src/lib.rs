@@ -17,6 +17,7 @@ pub mod backend;
 pub mod bands;
 pub mod color;
 pub mod decode;
+pub mod diagnosis;
 pub mod engine;
 pub mod evidence;
 pub mod field;

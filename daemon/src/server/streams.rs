@@ -8,8 +8,8 @@ use foreframe_engine::{EngineConfig, MonoTime, StreamFormat as EngineFormat};
 use foreframe_protocol::memory::ReadOnlyPool;
 use foreframe_protocol::slots::UiOrder;
 use foreframe_protocol::{
-    CreateStream, EndReason, ErrorCode, OutputFrame, Pacing, PlaneKind, Presented, ReleaseReason,
-    SlotReleased, Statistics, StreamEnded,
+    CreateStream, EndReason, ErrorCode, ErrorMessage, OutputFrame, Pacing, PlaneKind, Presented,
+    ReleaseReason, SlotReleased, Statistics, StreamEnded,
 };
 use tracing::{debug, error, info};
 
@@ -26,6 +26,9 @@ use crate::stream::mailbox::Mailbox;
 use crate::stream::reaper::Reaped;
 use crate::stream::thread::{self, StreamParts};
 use crate::stream::{FromStream, StreamEvent};
+
+/// Keys of a stream that are looked at for what is wrong with their motion: a fifth of a second.
+const KEYS_TO_CHECK: u32 = 8;
 
 /// A stream whose thread runs.
 #[derive(Debug)]
@@ -113,6 +116,7 @@ impl Server {
                 engine: EngineConfig {
                     pixels_per_degree: config.pixels_per_degree,
                     finish: config.finish,
+                    keys_to_check: KEYS_TO_CHECK,
                     timer: clock::now,
                     worker_started: thread::ask_for_real_time_work,
                     ..EngineConfig::new(config.method, config.threads)
@@ -174,6 +178,9 @@ impl Server {
             ),
             StreamEvent::KeyRefused(message) => {
                 self.fail(session, Fault::from(message).of_stream(number));
+            }
+            StreamEvent::Noticed(message) => {
+                self.send(session, ErrorMessage { stream: Some(number), ..message });
             }
             StreamEvent::Presented(presented) => {
                 self.offer(session, Presented { stream: number, ..presented });

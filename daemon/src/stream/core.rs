@@ -271,6 +271,14 @@ impl StreamCore {
         self.engine.method()
     }
 
+    /// What is wrong with the motion of the first keys, once they were all looked at. Empty where
+    /// nothing is.
+    #[must_use]
+    pub fn suspicion(&self) -> Option<String> {
+        let check = self.engine.motion_check();
+        check.is_done().then(|| check.diagnosis().verdict.unwrap_or_default())
+    }
+
     /// What the engine makes of the newest key; None before the first.
     #[must_use]
     pub fn inspect(&self) -> Option<Inspection<'_>> {

@@ -30,6 +30,8 @@ pub enum StreamEvent {
     SlotCopied(SlotUse),
     /// A key frame or UI plane does not fit its stream. The message has everything but the stream's number.
     KeyRefused(ErrorMessage),
+    /// What its keys hold looks like something else than the stream declares. Lacks the stream's number.
+    Noticed(ErrorMessage),
     /// A key frame came to the display. Lacks the stream's number.
     Presented(Presented),
     /// Counts. Lacks the stream's number.

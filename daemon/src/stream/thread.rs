@@ -112,6 +112,8 @@ struct StreamThread {
     /// Whether no picture was made since the newest key was taken in.
     owes_picture: bool,
     refused: u64,
+    /// What is wrong with the client's motion. None until enough keys have moved to tell.
+    suspicion: Option<String>,
     repeats_in_a_row: u32,
     /// Whether it was said that the CPU took over from the GPU.
     told_of_fall: bool,
@@ -161,6 +163,7 @@ impl StreamThread {
             unshown: None,
             owes_picture: false,
             refused: 0,
+            suspicion: None,
             repeats_in_a_row: 0,
             told_of_fall: false,
             told_of_estimate: false,
@@ -276,6 +279,25 @@ impl StreamThread {
             },
         });
         self.send_pacing(submit.key_index);
+        self.look_at_motion();
+    }
+
+    /// Tells the client, once, what looks wrong with its motion.
+    fn look_at_motion(&mut self) {
+        if self.suspicion.is_some() {
+            return;
+        }
+        self.suspicion = self.core.suspicion();
+        let Some(found) = self.suspicion.clone().filter(|found| !found.is_empty()) else { return };
+        warn!(stream = self.parts.ordinal, found, "the client's motion is not what it says");
+        self.send(StreamEvent::Noticed(ErrorMessage {
+            code: ErrorCode::Content,
+            is_fatal: false,
+            stream: None,
+            field: "motion".to_owned(),
+            expected: "motion as the stream declares it".to_owned(),
+            found,
+        }));
     }
 
     /// Hands a key out of its slot to the engine, and to the recorder if there is one.
@@ -498,6 +520,7 @@ impl StreamThread {
         let sink = self.parts.sink.as_ref().map_or(0, SinkWorker::left_out);
         let fell = backend.fell_back.iter().map(|why| format!("the CPU took over: {why}"));
         let sink = (sink > 0).then(|| format!("the sink was too slow for {sink} frames"));
+        let suspicion = self.suspicion.clone().filter(|found| !found.is_empty());
         let mut report = StreamStatus {
             width: self.parts.create.format.width,
             height: self.parts.create.format.height,
@@ -510,7 +533,7 @@ impl StreamThread {
             ready_before_refresh: self.observed.headroom(),
             keys: [keys.received, keys.superseded, keys.refused + self.refused],
             frames: [frames.real, frames.synthesised, frames.repeated, frames.dropped],
-            warnings: fell.chain(sink).collect(),
+            warnings: fell.chain(sink).chain(suspicion).collect(),
             ..StreamStatus::default()
         };
         if let Some(window) = &mut self.window {

@@ -285,6 +285,9 @@ wire_enum! {
         Order = 8 "order",
         /// The daemon's own fault.
         Internal = 9 "internal",
+        /// What a plane holds looks like something else than the stream declares. It is taken as
+        /// declared, and nothing is refused.
+        Content = 10 "content",
     }
 }
 

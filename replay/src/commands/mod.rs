@@ -5,6 +5,7 @@ pub mod bench;
 pub mod completions;
 pub mod ctl;
 pub mod demo;
+pub mod doctor;
 pub mod export;
 pub mod import;
 pub mod info;

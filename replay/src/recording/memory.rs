@@ -108,6 +108,11 @@ impl MemoryRecording {
         }
     }
 
+    /// Declares the motion planes otherwise.
+    pub(crate) fn declare_motion(&mut self, declare: impl Fn(&mut MotionConvention)) {
+        self.format.motion.iter_mut().for_each(declare);
+    }
+
     /// Overwrites every plane of a frame with noise.
     pub(crate) fn poison(&mut self, frame: usize) {
         let stored = &mut self.frames[frame];

@@ -21,7 +21,8 @@ use glam::{DMat4, Mat4, Vec4};
 
 use super::error::DecodeError;
 use crate::format::DepthMeaning;
-use crate::key::Camera;
+use crate::key::{Camera, KeyFrame};
+use crate::plane::Rect;
 
 /// What a perspective projection does to depth (1).
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -111,5 +112,40 @@ impl CameraMotion {
         }
         let moved = [ndc[0] - older.x / older.w, older.y / older.w - ndc[1]];
         [moved[0] * 0.5 * self.size[0], moved[1] * 0.5 * self.size[1]]
+    }
+}
+
+/// The same of a key as it was decoded.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct StillWorld {
+    motion: CameraMotion,
+    depth: ProjectionDepth,
+    inverse_distance_per_depth_key: f32,
+}
+
+impl StillWorld {
+    /// Between what `key`'s motion points back to, which is `older`, and `key`. None unless cameras and
+    /// depth say where the world is.
+    pub(crate) fn between(older: &KeyFrame, key: &KeyFrame) -> Option<Self> {
+        let newer = key.camera?;
+        let size = super::size(key.valid);
+        let motion = CameraMotion::between(&key.motion_from_camera.or(older.camera)?, &newer, size);
+        Some(Self {
+            motion: motion.ok()?,
+            depth: ProjectionDepth::from_projection(&newer.projection)?,
+            inverse_distance_per_depth_key: key.inverse_distance_per_depth_key?,
+        })
+    }
+
+    /// Newer minus older position, pixels, of the still point at pixel `x`, `y` of the image `valid`.
+    #[expect(clippy::cast_precision_loss, reason = "sizes up to 8192 are exact")]
+    #[expect(clippy::cast_possible_truncation, reason = "depth as the buffer holds it")]
+    pub(crate) fn displacement(&self, valid: Rect, [x, y]: [f32; 2], depth_key: u32) -> [f32; 2] {
+        let [width, height] = super::size(valid);
+        let (u, v) = (x + 0.5 - valid.x as f32, y + 0.5 - valid.y as f32);
+        let inverse_distance =
+            f64::from(self.inverse_distance_per_depth_key) * f64::from(depth_key);
+        let z = self.depth.a + self.depth.b * inverse_distance;
+        self.motion.displacement(u / width, v / height, z as f32)
     }
 }

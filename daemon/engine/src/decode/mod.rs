@@ -22,6 +22,7 @@ mod motion_field;
 mod tests;
 
 pub use color::decode_ui;
+pub(crate) use camera::StillWorld;
 pub use error::{DecodeError, PlaneName};
 pub use motion_field::{MotionField, decode_field};
 
@@ -47,6 +48,12 @@ pub struct DecodeScratch {
 }
 
 impl DecodeScratch {
+    /// Motion as decoded of the key that was decoded last, if that has motion.
+    #[must_use]
+    pub fn displacement(&self) -> &Plane<[f32; 2]> {
+        &self.displacement
+    }
+
     /// Gives `key`, which was decoded last and has motion, its motion as decoded.
     pub fn hand_displacement(&mut self, key: &mut KeyFrame) {
         std::mem::swap(&mut self.displacement, &mut key.displacement);

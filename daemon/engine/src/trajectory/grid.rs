@@ -19,11 +19,16 @@ pub struct Grid {
 impl Grid {
     /// The grid of `key`'s field, which is that of its motion or, without motion, of its depth.
     #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "sizes up to 8192 and offsets of 256 are exact")]
     pub fn of(key: &KeyFrame) -> Self {
         let field = [key.displacement.width(), key.displacement.height()];
         let depth = [key.depth.width(), key.depth.height()];
-        let cells = if field[0] > 0 { field } else { depth };
+        Self::with_cells(key, if field[0] > 0 { field } else { depth })
+    }
+
+    /// The grid of a field of `key` that has so many columns and rows.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "sizes up to 8192 and offsets of 256 are exact")]
+    pub fn with_cells(key: &KeyFrame, cells: [u32; 2]) -> Self {
         let valid = key.valid;
         let step = [0, 1].map(|axis| {
             let length = [valid.width, valid.height][axis];
