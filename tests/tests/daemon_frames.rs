@@ -4,8 +4,9 @@ mod daemon_fixture;
 
 use daemon_fixture::{Client, KeySource, RunningDaemon, Screen};
 use foreframe_protocol::{
-    ColorFormat, DaemonMessage, DestroyStream, ErrorCode, LateCamera, OutputKind, OutputReleased,
-    PlaneDescriptor, PlaneKind, PlaneSize, ReleaseReason, StreamFormat, UiPlane,
+    CameraMotion, ColorFormat, DaemonMessage, DestroyStream, EndReason, ErrorCode, ErrorMessage,
+    Goodbye, LateCamera, MotionConvention, MotionDirection, MotionFormat, MotionUnit, OutputKind,
+    OutputReleased, PlaneDescriptor, PlaneKind, PlaneSize, ReleaseReason, StreamFormat, UiPlane,
 };
 
 const RED: [u8; 4] = [255, 0, 0, 255];
@@ -258,7 +259,7 @@ fn a_client_whose_motion_is_flipped_is_told_and_one_whose_motion_is_right_is_not
 
 /// The first error that a client that leaves was told.
 fn daemon_says(mut client: Client) -> Option<ErrorMessage> {
-    client.send(Goodbye { reason: EndReason::Asked });
+    client.send(Goodbye { reason: EndReason::Requested });
     client.read_to_end().into_iter().find_map(|message| match message {
         DaemonMessage::Error(error) => Some(error),
         _ => None,

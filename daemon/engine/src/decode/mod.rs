@@ -21,8 +21,8 @@ mod motion_field;
 #[cfg(test)]
 mod tests;
 
-pub use color::decode_ui;
 pub(crate) use camera::StillWorld;
+pub use color::decode_ui;
 pub use error::{DecodeError, PlaneName};
 pub use motion_field::{MotionField, decode_field};
 
