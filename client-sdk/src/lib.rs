@@ -50,9 +50,9 @@ pub use error::{Error, Result};
 pub use event::Event;
 pub use foreframe_protocol::{
     Camera, CameraMotion, ColorFormat, DepthFormat, DepthMeaning, EndReason, ErrorCode,
-    ErrorMessage, Features, GpuKind, Hint, MotionDirection, MotionFormat, MotionUnit, OutputKind,
-    Pacing, PciAddress, PlaneKind, PlaneSize, Presented, Primaries, Rect, ReleaseReason,
-    SlotReleased, Statistics, Transfer, ValidRectUse, Welcome,
+    ErrorMessage, Features, GpuKind, Hint, MaskClass, MotionDirection, MotionFormat, MotionUnit,
+    OutputKind, Pacing, PciAddress, PlaneKind, PlaneSize, Presented, Primaries, Rect,
+    ReleaseReason, SlotReleased, Statistics, Transfer, ValidRectUse, Welcome,
 };
 pub use frame::{KeyFrame, PlaneMut};
 pub use key::Key;

@@ -155,7 +155,8 @@ impl StreamOptions {
         self
     }
 
-    /// Adds mask planes, one class per pixel; colour is `ratio` larger per axis.
+    /// Adds mask planes, one byte per pixel, the code of its [`MaskClass`](crate::MaskClass): where
+    /// motion vectors do not tell how colour moves on. Colour is `ratio` larger per axis.
     pub fn mask(mut self, ratio: f64) -> Self {
         self.format.mask = Some(MaskFormat::Class8);
         self.mask_ratio = ratio;

@@ -212,6 +212,7 @@ pub fn key_input<'a>(
             .ok_or(IngestError::Planes { expected: "a color plane", found: "none" })?,
         depth: plane(PlaneKind::Depth)?,
         motion: plane(PlaneKind::Motion)?,
+        mask: plane(PlaneKind::Mask)?,
         camera: submit.camera.map(camera),
         motion_from_camera: submit.motion_from_camera.map(camera),
     })

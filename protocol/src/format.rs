@@ -121,10 +121,29 @@ wire_enum! {
 }
 
 wire_enum! {
+    /// What a pixel of a mask plane says of the pixel's motion. Other codes count as opaque.
+    MaskClass {
+        /// A surface that its motion vector belongs to.
+        Opaque = 0 "opaque",
+        /// A second layer that lets a surface show through.
+        Transparent = 1 "transparent",
+        /// Sparks, smoke, rain.
+        Particle = 2 "particle",
+        /// A shadow that moves otherwise than the surface that it falls on.
+        Shadow = 3 "shadow",
+        /// What a surface mirrors.
+        Reflection = 4 "reflection",
+        /// A texture that moves on its surface: a screen, water, a scrolling sign.
+        AnimatedTexture = 5 "animated_texture",
+        /// A surface without a motion vector, or with one that means nothing.
+        MotionInvalid = 6 "motion_invalid",
+    }
+}
+
+wire_enum! {
     /// How a mask plane is stored.
     MaskFormat {
-        /// One byte per pixel: 0 opaque, 1 transparent, 2 particle, 3 shadow, 4 reflection,
-        /// 5 animated texture, 6 motion invalid. Other values count as opaque.
+        /// One byte per pixel, the code of its [`MaskClass`].
         Class8 = 1 "class8",
     }
 }

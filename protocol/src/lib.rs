@@ -29,7 +29,7 @@ pub mod wire;
 
 pub use error::{Error, Result};
 pub use format::{
-    CameraMotion, ColorFormat, DepthConvention, DepthFormat, DepthMeaning, MaskFormat,
+    CameraMotion, ColorFormat, DepthConvention, DepthFormat, DepthMeaning, MaskClass, MaskFormat,
     MotionConvention, MotionDirection, MotionFormat, MotionUnit, Primaries, StreamFormat, Transfer,
     ValidRectUse,
 };

@@ -119,6 +119,7 @@ fn time(
             color: plane(&planes.color, width, height, 4),
             depth: Some(plane(&planes.depth, width / 2, height / 2, 4)),
             motion: Some(plane(&planes.motion, width / 2, height / 2, 4)),
+            mask: None,
             camera: None,
             motion_from_camera: None,
         });

@@ -245,6 +245,7 @@ impl Engine {
         }
         let is_by_flow = self.config.method == Method::Flow;
         let seen = KeyInput {
+            mask: input.mask.filter(|_| self.config.method.follows_motion()),
             motion: input.motion.filter(|_| !is_by_flow),
             motion_from: input.motion_from.filter(|_| !is_by_flow),
             ..*input
@@ -264,6 +265,7 @@ impl Engine {
         }
         let has_none = key.motion_from.is_none() && !key.is_cut;
         let is_estimated = has_none && self.estimate_motion(&mut key);
+        self.follow_picture(&mut key);
         let motion = match key.motion_from {
             _ if key.is_cut => MotionState::Cut,
             Some(_) if is_estimated => MotionState::Estimated,
@@ -316,6 +318,17 @@ impl Engine {
             decode.take_flow(&self.pool, flow, older.content_time, pixels_per_degree, key);
         }
         is_found
+    }
+
+    /// Lets the cells of `key` go by the motion of the picture whose mask says so.
+    fn follow_picture(&mut self, key: &mut KeyFrame) {
+        let has_both = key.motion_from.is_some() && !key.mask.data().is_empty();
+        let Some(older) = self.newest.as_ref().filter(|_| has_both && !key.is_cut) else { return };
+        let Scratch { decode, flow, .. } = &mut self.scratch;
+        if decode.asks_for_picture(key) && flow.find(&self.pool, key, older) {
+            let pixels_per_degree = self.config.pixels_per_degree;
+            decode.take_picture(&self.pool, flow, older.content_time, pixels_per_degree, key);
+        }
     }
 
     /// The client has moved the camera on to `view` (world to view, column-major) at

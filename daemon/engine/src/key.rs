@@ -104,6 +104,8 @@ pub struct KeyInput<'a> {
     pub depth: Option<PlaneInput<'a>>,
     /// Motion, if this key has it.
     pub motion: Option<PlaneInput<'a>>,
+    /// One class per pixel ([`crate::mask`]), a byte each, if this key has them.
+    pub mask: Option<PlaneInput<'a>>,
     /// Camera at `content_time`.
     pub camera: Option<Camera>,
     /// Camera at `motion_from`; needed where vectors lack the camera's motion.
@@ -165,6 +167,8 @@ pub struct KeyFrame {
     pub valid: Rect,
     /// Depth key per cell of the field grid, larger is nearer. Empty without a depth plane.
     pub depth: Plane<u32>,
+    /// Code of the class of each cell of the field grid. Empty without a mask plane.
+    pub mask: Plane<u8>,
     /// 1 / distance along the view axis of a depth key of 1, where that is known.
     pub inverse_distance_per_depth_key: Option<f32>,
     /// Dilated, quantised motion per cell of the field grid. Empty without a motion plane.

@@ -28,6 +28,7 @@ pub mod inspect;
 pub mod kernels;
 pub mod key;
 mod lanes;
+pub mod mask;
 pub mod method;
 pub mod pacing;
 pub mod params;

@@ -79,6 +79,7 @@ fn engine() -> Engine {
             color: plane(&color, 4),
             depth: None,
             motion: Some(plane(&motion, 8)),
+            mask: None,
             camera: None,
             motion_from_camera: None,
         })

@@ -137,7 +137,10 @@ impl Daemon {
             SinkSpec::Null => Features::NONE,
             _ => Features::OUTPUT,
         };
-        let features = features.with(Features::LATE_CAMERA).with(Features::UI_PLANE);
+        let features = features
+            .with(Features::LATE_CAMERA)
+            .with(Features::UI_PLANE)
+            .with(Features::MASK_PLANE);
         let terms = Terms {
             features,
             max_streams: MAX_STREAMS,

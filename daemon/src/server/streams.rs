@@ -75,14 +75,15 @@ impl Stream {
 
 /// Bytes of private memory that a stream may take: eight pictures (two keys, a copy, the one being
 /// made, four on the way to a sink), 48 bytes a pixel of depth, motion and what the warp needs, and a
-/// user interface.
+/// user interface and a mask.
 pub(super) fn stream_cost(create: &CreateStream) -> u64 {
     let bytes_per_pixel = u64::from(create.format.color.bytes_per_pixel());
     let area = |kind| {
         let size = create.max_sizes.get(kind);
         size.map_or(0, |size| u64::from(size.width) * u64::from(size.height))
     };
-    area(PlaneKind::Color) * (8 * bytes_per_pixel + 48) + area(PlaneKind::Ui) * bytes_per_pixel
+    let others = area(PlaneKind::Ui) * bytes_per_pixel + area(PlaneKind::Mask);
+    area(PlaneKind::Color) * (8 * bytes_per_pixel + 48) + others
 }
 
 impl Server {

@@ -88,6 +88,7 @@ pub fn enum_layouts() -> Vec<EnumLayout> {
         f::MotionUnit::LAYOUT,
         f::CameraMotion::LAYOUT,
         f::MaskFormat::LAYOUT,
+        f::MaskClass::LAYOUT,
         handshake::Clock::LAYOUT,
         handshake::GpuKind::LAYOUT,
         reject::RejectCode::LAYOUT,

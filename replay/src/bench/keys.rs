@@ -64,6 +64,7 @@ impl RenderedKeys {
                 color: plane(key.color.rgba, size, 4),
                 depth: Some(plane(depth, key.depth_size, 4)),
                 motion: Some(plane(motion, key.motion_size, CLIENT_MOTION.bytes_per_pixel())),
+                mask: None,
                 ui: None,
                 camera: Some(camera(&key.camera)),
                 motion_from_camera: Some(camera(&key.motion_from_camera)),

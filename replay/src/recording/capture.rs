@@ -212,10 +212,9 @@ impl<S: ReadAt> Recording for CaptureRecording<S> {
         let format = &self.capture.streams()[self.stream].format;
         let is_wanted = |info: &PlaneInfo| match info.kind {
             PlaneKind::Color => true,
-            PlaneKind::Depth => wanted != Wanted::Color,
+            PlaneKind::Depth | PlaneKind::Mask => wanted != Wanted::Color,
             PlaneKind::Motion => motion == Some(*info),
             PlaneKind::Ui => wanted != Wanted::Color && format.ui == Some(format.color),
-            PlaneKind::Mask => false,
         };
         let captured = self.capture.frame_with(place.number, is_wanted)?;
         let mut submit = captured.submit;
@@ -288,6 +287,7 @@ fn frame_of<'a>(
         color: plane(PlaneKind::Color, input.color),
         depth: input.depth.map(|depth| plane(PlaneKind::Depth, depth)),
         motion: input.motion.map(|motion| plane(PlaneKind::Motion, motion)),
+        mask: input.mask.map(|mask| plane(PlaneKind::Mask, mask)),
         ui: ui.map(|ui| plane(PlaneKind::Ui, ui)),
         camera: input.camera,
         motion_from_camera: input.motion_from_camera,

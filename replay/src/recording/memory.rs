@@ -154,6 +154,7 @@ impl Recording for MemoryRecording {
             color: stored.color.clone(),
             depth,
             motion: motion.map(|plane| stored.motions[plane].clone()),
+            mask: None,
             ui: None,
             camera: None,
             motion_from_camera: None,

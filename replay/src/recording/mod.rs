@@ -78,6 +78,8 @@ pub struct Frame {
     pub depth: Option<OwnedPlane>,
     /// Motion.
     pub motion: Option<OwnedPlane>,
+    /// Class of each pixel.
+    pub mask: Option<OwnedPlane>,
     /// User interface, in the format of colour. Only what is replayed shows it.
     pub ui: Option<OwnedPlane>,
     /// Camera at `content_time`.
@@ -98,6 +100,7 @@ impl Frame {
             color: self.color.as_input(),
             depth: self.depth.as_ref().map(OwnedPlane::as_input),
             motion: self.motion.as_ref().map(OwnedPlane::as_input),
+            mask: self.mask.as_ref().map(OwnedPlane::as_input),
             camera: self.camera,
             motion_from_camera: self.motion_from_camera,
         }
@@ -115,7 +118,7 @@ impl Frame {
 pub enum Wanted {
     /// Colour alone: a ground truth.
     Color,
-    /// Colour, depth, user interface, and one of the motion planes of [`FrameHead::motions`], if any.
+    /// Colour, depth, mask, user interface, and one of the motion planes of [`FrameHead::motions`], if any.
     Key {
         /// Which one.
         motion: Option<usize>,

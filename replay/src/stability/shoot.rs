@@ -39,6 +39,8 @@ pub struct KeyShot {
     pub depth: Vec<f32>,
     /// Position at `motion_from` minus position at `time`, pixels, by pixel of that part.
     pub motion: Vec<[f32; 2]>,
+    /// Class of every pixel of that part, where they are handed over.
+    pub mask: Option<Vec<u8>>,
     /// Whether depth is handed over.
     pub has_depth: bool,
     /// Whether motion is handed over.
@@ -64,13 +66,23 @@ pub struct KeyRecipe {
     pub jitter: [i32; 2],
     /// Whether that is declared.
     pub declares_jitter: bool,
+    /// Whether a mask says what pixels show.
+    pub has_mask: bool,
 }
 
 impl KeyRecipe {
     /// A key at `time` whose motion points back to `motion_from`, with nothing special about it.
     #[must_use]
     pub fn new(time: f64, motion_from: f64) -> Self {
-        Self { time, motion_from, is_cut: false, scale: 1.0, jitter: [0; 2], declares_jitter: true }
+        Self {
+            time,
+            motion_from,
+            is_cut: false,
+            scale: 1.0,
+            jitter: [0; 2],
+            declares_jitter: true,
+            has_mask: false,
+        }
     }
 
     /// Renders it.
@@ -87,6 +99,7 @@ impl KeyRecipe {
             color: probe.color(self.time, size).rgba,
             depth,
             motion,
+            mask: self.has_mask.then(|| probe.classes(self.time, size)),
             has_depth: true,
             has_motion: true,
             jitter: declared.map(|sevenths| sevenths as f32 / JITTER_GRID as f32),
@@ -161,6 +174,7 @@ impl KeyShot {
             color: self.plane(&self.color, 4),
             depth: self.has_depth.then(|| fields(&depth, 4)),
             motion: self.has_motion.then(|| fields(&motion, 8)),
+            mask: self.mask.as_ref().map(|mask| self.plane(mask, 1)),
             ui: None,
             camera: Some(self.camera),
             motion_from_camera: Some(self.motion_from_camera),

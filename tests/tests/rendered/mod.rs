@@ -68,6 +68,7 @@ impl Rendered {
             color: plane(&key.color.rgba, self.size),
             depth: Some(plane(&depth, key.depth_size)),
             motion: Some(plane(&motion, key.motion_size)),
+            mask: None,
             camera: Some(camera(&key.camera)),
             motion_from_camera: Some(camera(&key.motion_from_camera)),
         };

@@ -161,6 +161,37 @@ impl<'a> FieldInput<'a> {
         contradiction
     }
 
+    /// Codes of the classes of the grid's cells; none without a mask or a grid.
+    pub(super) fn decode_mask(
+        &self,
+        plane: Option<&CheckedPlane<'_>>,
+        columns: &mut [Vec<u16>; 2],
+        mask: &mut Plane<u8>,
+    ) {
+        let Some(plane) = plane.filter(|_| !self.cells.contains(&0)) else {
+            return mask.resize(0, 0);
+        };
+        self.tables(plane, columns);
+        let [columns, rows] = &*columns;
+        mask.resize(self.cells[0], self.cells[1]);
+        for_each_row(
+            self.pool,
+            mask,
+            #[inline(always)]
+            |y, out| {
+                plane.with_valid_row(
+                    u32::from(rows[y as usize]),
+                    #[inline(always)]
+                    |row| {
+                        for (class, &x) in out.iter_mut().zip(columns) {
+                            *class = row[usize::from(x)];
+                        }
+                    },
+                );
+            },
+        );
+    }
+
     /// 1 / distance along the view axis of a depth key of 1, where that is known.
     pub(super) fn inverse_distance_per_depth_key(&self) -> Option<f32> {
         let convention = self.depth.and(self.format.depth)?;

@@ -31,6 +31,7 @@ use rayon::ThreadPool;
 use crate::color::ColorPlane;
 use crate::format::{CameraMotion, DepthMeaning, StreamFormat};
 use crate::key::{KeyFrame, KeyInput};
+use crate::mask;
 use crate::plane::{Plane, Rect};
 use crate::time::MonoTime;
 use crate::trajectory::dilate_motion::{DilateParams, dilate_motion};
@@ -44,6 +45,8 @@ use geometry::CheckedPlane;
 pub struct DecodeScratch {
     color: ColorPlane,
     displacement: Plane<[f32; 2]>,
+    /// The motion of the picture, where a mask asks for it.
+    picture: Plane<[f32; 2]>,
     columns: [Vec<u16>; 2],
 }
 
@@ -57,6 +60,31 @@ impl DecodeScratch {
     /// Gives `key`, which was decoded last and has motion, its motion as decoded.
     pub fn hand_displacement(&mut self, key: &mut KeyFrame) {
         std::mem::swap(&mut self.displacement, &mut key.displacement);
+    }
+
+    /// Whether cells of `key`, which was decoded last and has motion, go by that of the picture.
+    #[must_use]
+    pub fn asks_for_picture(&self, key: &KeyFrame) -> bool {
+        mask::asks_for_picture(&key.mask, &self.displacement)
+    }
+
+    /// Gives those cells what `flow` found since `from`, the content time of the key before.
+    pub fn take_picture(
+        &mut self,
+        pool: &ThreadPool,
+        flow: &Flow,
+        from: MonoTime,
+        pixels_per_degree: Option<f32>,
+        key: &mut KeyFrame,
+    ) {
+        let Some(span) = key.motion_span() else { return };
+        let interval = key.content_time - from;
+        #[expect(clippy::cast_possible_truncation, reason = "a ratio of two intervals")]
+        let scale = (span.as_secs_f64() / interval.as_secs_f64()) as f32;
+        flow.fill([key.mask.width(), key.mask.height()], &mut self.picture);
+        mask::take_picture(&key.mask, &self.picture, scale, &mut self.displacement);
+        let params = DilateParams { pixels_per_degree, span };
+        dilate_motion(pool, &params, &key.depth, &self.displacement, &mut key.velocity);
     }
 
     /// Gives `key`, which was decoded last and has no motion, that which `flow` found since `from`, as
@@ -126,6 +154,7 @@ pub fn decode_key(
     } else {
         key.depth.resize(0, 0);
     }
+    field.decode_mask(planes.mask.as_ref(), &mut scratch.columns, &mut key.mask);
     let span = planes.motion.and(input.motion_from).map(|from| input.content_time - from);
     report.lacks_camera_motion =
         span.is_some() && !input.is_cut && lacks_camera_motion(format, input, &planes);
@@ -134,6 +163,9 @@ pub fn decode_key(
         return Ok(report);
     };
     field.decode_motion(&mut scratch.columns, &mut scratch.displacement)?;
+    if !key.mask.data().is_empty() {
+        mask::fill_invalid(pool, &key.mask, &key.depth, &mut scratch.displacement);
+    }
     let params = DilateParams { pixels_per_degree, span };
     dilate_motion(pool, &params, &key.depth, &scratch.displacement, &mut key.velocity);
     key.motion_from = input.motion_from;
@@ -155,6 +187,7 @@ struct CheckedKey<'a> {
     color: CheckedPlane<'a>,
     depth: Option<CheckedPlane<'a>>,
     motion: Option<CheckedPlane<'a>>,
+    mask: Option<CheckedPlane<'a>>,
 }
 
 impl<'a> CheckedKey<'a> {
@@ -184,6 +217,7 @@ impl<'a> CheckedKey<'a> {
         let motion_bytes = format.motion.map(|motion| motion.format.bytes_per_pixel());
         let depth = field_plane(PlaneName::Depth, input.depth, depth_bytes)?;
         let motion = field_plane(PlaneName::Motion, input.motion, motion_bytes)?;
+        let mask = field_plane(PlaneName::Mask, input.mask, Some(1))?;
         for camera in [&input.camera, &input.motion_from_camera].into_iter().flatten() {
             camera::check_camera(camera)?;
         }
@@ -191,7 +225,7 @@ impl<'a> CheckedKey<'a> {
             let content_time = input.content_time;
             return Err(DecodeError::MotionFrom { content_time, motion_from });
         }
-        Ok(Self { color, depth, motion })
+        Ok(Self { color, depth, motion, mask })
     }
 }
 

@@ -101,6 +101,7 @@ mod tests {
             color: plane(&color, 4),
             depth: Some(plane(depths.as_flattened(), 4)),
             motion: Some(plane(vector_bytes.as_flattened(), 8)),
+            mask: None,
             camera: None,
             motion_from_camera: None,
         };

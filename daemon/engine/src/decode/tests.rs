@@ -151,6 +151,7 @@ fn input<'a>(told: &'a Told) -> KeyInput<'a> {
         color: plane(&COLOR, WIDTH, HEIGHT),
         depth: Some(plane(&told.depth, WIDTH, HEIGHT)),
         motion: Some(plane(&told.motion, WIDTH, HEIGHT)),
+        mask: None,
         camera: told.camera,
         motion_from_camera: None,
     }

@@ -5,6 +5,7 @@ use crate::format::{CameraMotion, MotionConvention, MotionDirection, MotionForma
 use crate::key::PlaneInput;
 
 mod change_of_method;
+mod mask;
 
 const SIZE: u32 = 16;
 
@@ -41,6 +42,7 @@ fn push(engine: &mut Engine, at_ms: i64, seed: u8) -> Result<KeyReport, DecodeEr
         color: plane(&color, 4),
         depth: None,
         motion: Some(plane(&motion, 8)),
+        mask: None,
         camera: None,
         motion_from_camera: None,
     })
@@ -231,6 +233,7 @@ fn push_place(engine: &mut Engine, at_ms: i64, seed: u32, moved: u32) {
         color: plane(&color, 4),
         depth: None,
         motion: Some(plane(&motion, 8)),
+        mask: None,
         camera: None,
         motion_from_camera: None,
     });

@@ -179,6 +179,7 @@ fn shown(method: Method, ui: Option<&[u8]>) -> [Vec<u8>; 2] {
             color: packed(&color, 4),
             depth: None,
             motion: Some(packed(&motion, 8)),
+            mask: None,
             camera: None,
             motion_from_camera: None,
         };

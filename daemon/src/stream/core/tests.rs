@@ -73,6 +73,7 @@ impl Rig {
             color: plane(&color, 4),
             depth: None,
             motion: Some(plane(&motion, 8)),
+            mask: None,
             camera: None,
             motion_from_camera: None,
         };

@@ -40,6 +40,23 @@ fn without_motion_a_method_that_needs_it_estimates_it_and_recovers_with_the_next
 }
 
 #[test]
+fn a_mask_lets_a_reflection_move_that_no_vector_tells_of() {
+    let case = |has_mask| {
+        let mut keys: Vec<_> =
+            (0..6).map(|key| KeyRecipe::new(f64::from(key), f64::from(key) - 1.0)).collect();
+        keys.iter_mut().for_each(|key| key.has_mask = has_mask);
+        Case { probe: Box::new(|| probes::mirror(4.0)), keys, calm: None, ..case(None, Vec::new()) }
+    };
+    let methods = [Method::Hold, Method::Linear];
+    let plain = run_case(&case(false), &methods).unwrap();
+    let masked = run_case(&case(true), &methods).unwrap();
+    let psnr = |points: &[MethodPoint], method| of(points, method).psnr_rgb_db;
+    assert!((psnr(&plain, Method::Linear) - psnr(&plain, Method::Hold)).abs() < 0.1);
+    assert!(psnr(&masked, Method::Linear) > psnr(&plain, Method::Linear) + 3.0);
+    assert!((psnr(&masked, Method::Hold) - psnr(&plain, Method::Hold)).abs() < 1e-9);
+}
+
+#[test]
 fn a_key_that_never_arrives_is_predicted_too_and_from_the_key_before_it() {
     let sound = run_case(&case(None, Vec::new()), &METHODS).unwrap();
     let dropped = run_case(&case(None, vec![3]), &METHODS).unwrap();

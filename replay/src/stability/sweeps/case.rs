@@ -76,6 +76,12 @@ impl Case {
         }
     }
 
+    /// The same with a mask beside every key.
+    pub(super) fn masked(mut self) -> Self {
+        self.keys.iter_mut().for_each(|key| key.has_mask = true);
+        self
+    }
+
     /// A scene where something happens before key `sound_again`, beside a calm one; measured are
     /// `measured` intervals.
     pub(super) fn with_event(

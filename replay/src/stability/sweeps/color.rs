@@ -19,6 +19,32 @@ pub(super) fn scrolling() -> Vec<Point> {
     SPEEDS.map(|speed| Point::new(speed, Case::steady(move || probes::scrolling(speed)))).into()
 }
 
+/// The points of another sweep, with a mask that says what is special.
+fn masked(points: Vec<Point>) -> Vec<Point> {
+    let masked = |point: Point| Point { case: point.case.masked(), ..point };
+    points.into_iter().map(masked).collect()
+}
+
+pub(super) fn shadow_mask() -> Vec<Point> {
+    masked(shadow())
+}
+
+pub(super) fn mirror_mask() -> Vec<Point> {
+    masked(mirror())
+}
+
+pub(super) fn scrolling_mask() -> Vec<Point> {
+    masked(scrolling())
+}
+
+pub(super) fn glass_mask() -> Vec<Point> {
+    masked(glass())
+}
+
+pub(super) fn particles_mask() -> Vec<Point> {
+    masked(particles())
+}
+
 pub(super) fn glass() -> Vec<Point> {
     let at = |opacity: f64| Point::new(opacity, Case::steady(move || probes::glass(opacity)));
     [0.1, 0.25, 0.5, 0.75, 1.0].map(at).into()

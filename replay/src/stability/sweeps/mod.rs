@@ -84,6 +84,26 @@ pub const SWEEPS: &[Sweep] = &[
         color::scrolling,
     ),
     sweep(
+        "shadow-mask",
+        "shadows, and a mask that says so",
+        "px per key interval",
+        color::shadow_mask,
+    ),
+    sweep(
+        "mirror-mask",
+        "a mirror, and a mask that says so",
+        "px per key interval",
+        color::mirror_mask,
+    ),
+    sweep("glass-mask", "panes of glass, and a mask that says so", "opacity", color::glass_mask),
+    sweep("particles-mask", "sparks, and a mask that says so", "how many", color::particles_mask),
+    sweep(
+        "scrolling-mask",
+        "a scrolling texture, and a mask that says so",
+        "px per key interval",
+        color::scrolling_mask,
+    ),
+    sweep(
         "depth-noise",
         "noise on depth, three keys long",
         "standard deviation, % of depth",
