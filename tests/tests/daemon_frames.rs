@@ -2,12 +2,20 @@
 
 mod daemon_fixture;
 
+use std::path::Path;
+
 use daemon_fixture::{Client, KeySource, RunningDaemon, Screen};
 use foreframe_protocol::{
     CameraMotion, ColorFormat, DaemonMessage, DestroyStream, EndReason, ErrorCode, ErrorMessage,
     Goodbye, LateCamera, MotionConvention, MotionDirection, MotionFormat, MotionUnit, OutputKind,
     OutputReleased, PlaneDescriptor, PlaneKind, PlaneSize, ReleaseReason, StreamFormat, UiPlane,
 };
+use foreframe_replay::recording::Recording as _;
+use foreframe_replay::recording::capture::CaptureRecording;
+use foreframe_replay::recording::keys::KeyReader;
+use foreframe_replay::recording::plan::Plan;
+use foreframe_replay::virtual_time::keys::{KeyTiming, timed_keys, timed_uis};
+use foreframe_replay::virtual_time::{ReplayConfig, replay};
 
 const RED: [u8; 4] = [255, 0, 0, 255];
 const GREEN: [u8; 4] = [0, 255, 0, 255];
@@ -288,12 +296,21 @@ fn submit_ui(
     ui
 }
 
-/// The first frame with this pixel at column 5 of row 2.
-fn expect_pixel(client: &mut Client, screen: &Screen, color: [u8; 4]) -> Vec<u8> {
+/// The first frame with this pixel at column 5 of row 2. Every frame until then that is not the one
+/// before again is put behind `seen`.
+fn expect_pixel(
+    client: &mut Client,
+    screen: &Screen,
+    color: [u8; 4],
+    seen: &mut Vec<Vec<u8>>,
+) -> Vec<u8> {
     loop {
         let frame = client.expect_frame(screen);
         let pixels = screen.pixels(&frame);
         client.send(OutputReleased { pool: frame.pool, slot: frame.slot });
+        if seen.last() != Some(&pixels) {
+            seen.push(pixels.clone());
+        }
         if pixels[4 * (2 * 8 + 5)..][..4] == color {
             return pixels;
         }
@@ -311,21 +328,22 @@ fn a_user_interface_changes_without_a_key_and_lies_over_the_next_one_too() {
     let mut client = daemon.connect();
     let mut source = client.open_stream_of(1, with_ui());
     let screen = client.subscribe(1, 3);
+    let mut seen = Vec::new();
     // Its own UI plane is all zero: clear.
     client.submit(&mut source, RED);
-    expect_pixel(&mut client, &screen, RED);
+    expect_pixel(&mut client, &screen, RED, &mut seen);
     let first = submit_ui(&mut client, &mut source, 1, [0, 0, 200, 255]);
-    let shown = expect_pixel(&mut client, &screen, [0, 0, 200, 255]);
+    let shown = expect_pixel(&mut client, &screen, [0, 0, 200, 255], &mut seen);
     for (i, pixel) in shown.chunks(4).enumerate() {
         let is_covered = (4..7).contains(&(i % 8)) && (1..3).contains(&(i / 8));
         assert_eq!(pixel, if is_covered { [0, 0, 200, 255] } else { RED }, "pixel {i}");
     }
     // 100 of 255 parts of blue over red.
     submit_ui(&mut client, &mut source, 2, [0, 0, 100, 100]);
-    expect_pixel(&mut client, &screen, [155, 0, 100, 255]);
+    expect_pixel(&mut client, &screen, [155, 0, 100, 255], &mut seen);
     // The next key brings a clear one.
     client.submit(&mut source, GREEN);
-    expect_pixel(&mut client, &screen, GREEN);
+    expect_pixel(&mut client, &screen, GREEN, &mut seen);
     daemon.stop();
     let capture = foreframed::capture::Capture::open(&daemon.path("a.mcap")).unwrap();
     let recorded: Vec<_> = capture.ui_planes().copied().collect();
@@ -334,6 +352,42 @@ fn a_user_interface_changes_without_a_key_and_lies_over_the_next_one_too() {
     assert_eq!(capture.ui_pixels(1).unwrap().bytes, [0, 0, 100, 100].repeat(6));
     let arrivals: Vec<_> = capture.times().map(|times| times.arrived_at_ns).collect();
     assert!(recorded.iter().all(|ui| (arrivals[0]..=arrivals[1]).contains(&ui.arrived_at_ns)));
+    assert_eq!(seen.len(), 4);
+    assert!(replayed(&daemon.path("a.mcap"), true) == seen, "a replay shows what was shown live");
+    assert!(replayed(&daemon.path("a.mcap"), false) != seen, "and not without what came between");
+}
+
+/// What a replay of the capture shows, without repetitions; with the user interfaces between keys or not.
+fn replayed(path: &Path, with_ui: bool) -> Vec<Vec<u8>> {
+    let mut recording = CaptureRecording::open(path).unwrap();
+    let one = std::num::NonZeroUsize::MIN;
+    let plan = Plan::new(recording.heads(), one);
+    let reader = KeyReader::new(recording.format(), &plan).unwrap();
+    let timing = KeyTiming::AsRecorded;
+    let uis = timed_uis(&recording.ui_arrivals(), recording.heads(), &plan, timing);
+    let uis = recording.read_uis(if with_ui { uis } else { Vec::new() });
+    let config = ReplayConfig {
+        method: foreframe_engine::Method::Linear,
+        gpu: None,
+        threads: one,
+        refresh_interval: foreframe_engine::MonoSpan::from_hz(120.0),
+        display_origin: recording.display_origin().unwrap(),
+        pixels_per_degree: None,
+        late_cameras: Vec::new(),
+        finish: foreframe_engine::FinishConfig::default(),
+    };
+    let keys = timed_keys(&mut recording, &reader, &plan, timing);
+    let mut seen: Vec<Vec<u8>> = Vec::new();
+    replay(*reader.format(), &config, keys, uis, |_, picture| {
+        let mut bytes = Vec::new();
+        picture.write_bytes(&mut bytes);
+        if seen.last() != Some(&bytes) {
+            seen.push(bytes);
+        }
+        Ok(())
+    })
+    .unwrap();
+    seen
 }
 
 #[test]
@@ -342,6 +396,7 @@ fn a_ui_plane_that_does_not_fit_costs_itself_and_one_of_another_format_its_strea
     let mut client = daemon.connect();
     let mut source = client.open_stream_of(1, with_ui());
     let screen = client.subscribe(1, 3);
+    let mut seen = Vec::new();
     client.submit(&mut source, RED);
     let mut large = submit_ui(&mut client, &mut source, 1, [9, 9, 9, 255]);
     large.ui_index = 2;
@@ -355,7 +410,7 @@ fn a_ui_plane_that_does_not_fit_costs_itself_and_one_of_another_format_its_strea
     let error = client.expect_error();
     assert!(error.code == ErrorCode::Plane && !error.is_fatal, "{error:?}");
     submit_ui(&mut client, &mut source, 3, [7, 7, 7, 255]);
-    expect_pixel(&mut client, &screen, [7, 7, 7, 255]);
+    expect_pixel(&mut client, &screen, [7, 7, 7, 255], &mut seen);
 
     let format = StreamFormat { ui: Some(ColorFormat::Rgba16f), ..StreamFormat::rgba8(8, 8) };
     let create = foreframe_protocol::CreateStream {
