@@ -56,8 +56,8 @@ pub struct Args {
     /// [default: every refresh]
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub cap: Option<f64>,
-    /// What to draw into the pictures of windows: off, stats, motion, grid, rungs, tear, only-real
-    /// or only-synthesised; `h` in a window goes through them [default: off]
+    /// What to draw into the pictures of windows: off, stats, motion, grid, rungs, disocclusion, tear,
+    /// only-real or only-synthesised; `h` in a window goes through them [default: off]
     #[arg(long, value_name = "VIEW")]
     #[serde(default, deserialize_with = "from_name")]
     pub hud: Option<HudView>,

@@ -1,5 +1,7 @@
 //! Key frames go in, pictures come out: at a subscriber, as PNG files, as a y4m file.
 
+#![allow(clippy::unwrap_used, reason = "a helper that cannot go on fails its test")]
+
 mod daemon_fixture;
 
 use std::path::Path;

@@ -8,7 +8,11 @@ use crate::evidence::Evidence;
 use crate::field::FieldMap;
 use crate::key::{KeyFrame, Velocity};
 use crate::method::Method;
+use crate::plane::Plane;
 use crate::trajectory::rung::Rung;
+
+/// Pixels between the samples that shares are counted of, per axis.
+const SHARE_STRIDE: usize = 16;
 
 /// The newest key, seen pixel by pixel.
 #[derive(Clone, Copy, Debug)]
@@ -48,6 +52,65 @@ impl Inspection<'_> {
             }
             _ => Rung::Linear,
         }
+    }
+
+    /// Which part of the picture goes on by which model, percent, the largest first.
+    #[must_use]
+    pub fn rung_percent(&self) -> Vec<(&'static str, f64)> {
+        let mut counts: Vec<(&'static str, u32)> = Vec::new();
+        let (width, height) = (self.key.color.width(), self.key.color.height());
+        for y in (0..height).step_by(SHARE_STRIDE) {
+            for x in (0..width).step_by(SHARE_STRIDE) {
+                let name = self.rung_at(x, y).name();
+                match counts.iter_mut().find(|(known, _)| *known == name) {
+                    Some((_, count)) => *count += 1,
+                    None => counts.push((name, 1)),
+                }
+            }
+        }
+        let all: u32 = counts.iter().map(|(_, count)| count).sum();
+        counts.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+        let percent = |count: u32| 100.0 * f64::from(count) / f64::from(all.max(1));
+        counts.into_iter().map(|(name, count)| (name, percent(count))).collect()
+    }
+
+    /// Blocks of `block` pixels that no block of the key lands on at `phase`: what has come into sight,
+    /// and is filled.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "sizes up to 8192 are exact")]
+    pub fn uncovered(&self, phase: f64, block: u32) -> Plane<bool> {
+        let size = [self.key.color.width(), self.key.color.height()];
+        let [columns, rows] = size.map(|length| length.div_ceil(block));
+        let mut uncovered = Plane::new(columns, rows);
+        uncovered.data_mut().fill(true);
+        let length = block as f32;
+        let landed = |column: u32, row: u32| {
+            let middle = |block_index: u32| block_index * block + block / 2;
+            let [dx, dy] = self.motion_at(middle(column), middle(row)).unwrap_or_default();
+            let phase = phase as f32;
+            [column as f32 * length + dx * phase, row as f32 * length + dy * phase]
+        };
+        for row in 0..rows {
+            for column in 0..columns {
+                let from = landed(column, row);
+                let neighbours = [landed(column + 1, row)[0], landed(column, row + 1)[1]];
+                // A surface that grows stays closed; one that ends, ends.
+                let [across, down] = [0, 1].map(|axis| {
+                    let end = from[axis] + length;
+                    let is_same = (neighbours[axis] - end).abs() < length;
+                    let to = if is_same { end.max(neighbours[axis]) } else { end };
+                    let first = (from[axis] / length - 0.5).ceil().max(0.0) as u32;
+                    let last = (to / length - 0.5).floor();
+                    first..if last < 0.0 { 0 } else { last as u32 + 1 }
+                });
+                for y in down.start..down.end.min(rows) {
+                    for x in across.start..across.end.min(columns) {
+                        uncovered.row_mut(y)[x as usize] = false;
+                    }
+                }
+            }
+        }
+        uncovered
     }
 
     /// The cell of the field grid that holds a pixel of the image.

@@ -61,6 +61,8 @@ pub struct StreamStatus {
     pub keys: [u64; 3],
     /// Refreshes since the start: real, synthesised, repeated, dropped.
     pub frames: [u64; 4],
+    /// Which part of the picture goes on by which model, percent, the largest first.
+    pub models_percent: Vec<(String, f64)>,
     /// What somebody should look at, one line each.
     pub warnings: Vec<String>,
 }

@@ -32,6 +32,8 @@ pub enum HudView {
     Grid,
     /// The model that each block goes on by.
     Rungs,
+    /// What comes into sight behind what moves, and is filled.
+    Disocclusion,
     /// A bar that changes with every frame, in which tearing shows.
     Tear,
     /// Real frames alone.
@@ -42,12 +44,13 @@ pub enum HudView {
 
 impl HudView {
     /// All of them, in the order in which a key press goes through them.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Off,
         Self::Stats,
         Self::Motion,
         Self::Grid,
         Self::Rungs,
+        Self::Disocclusion,
         Self::Tear,
         Self::OnlyReal,
         Self::OnlySynthesised,
@@ -62,6 +65,7 @@ impl HudView {
             Self::Motion => "motion",
             Self::Grid => "grid",
             Self::Rungs => "rungs",
+            Self::Disocclusion => "disocclusion",
             Self::Tear => "tear",
             Self::OnlyReal => "only-real",
             Self::OnlySynthesised => "only-synthesised",
@@ -148,6 +152,9 @@ impl Hud {
             (HudView::Off, _) => return,
             (HudView::Motion, Some(inspection)) => views::motion(inspection, picture),
             (HudView::Rungs, Some(inspection)) => views::rungs(inspection, picture),
+            (HudView::Disocclusion, Some(inspection)) => {
+                views::disocclusion(inspection, frame.phase.as_f64(), picture);
+            }
             (HudView::Grid, Some(inspection)) => {
                 views::grid(inspection, frame.phase.as_f64(), picture);
             }

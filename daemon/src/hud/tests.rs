@@ -161,6 +161,34 @@ fn motion_shows_directions_apart_and_the_grid_moves_with_the_phase() {
 }
 
 #[test]
+fn what_comes_into_sight_is_marked_and_grows_with_the_phase() {
+    let engine = engine();
+    let marked = |phase: f64| {
+        let uncovered = engine.inspect().unwrap().uncovered(phase, 4);
+        let is_marked = |x: u32, y: u32| uncovered.at(x / 4, y / 4);
+        // The left half moves right, the right half down: from either border inwards.
+        assert!(!is_marked(WIDTH / 4, HEIGHT / 2) && !is_marked(WIDTH - 9, HEIGHT / 2));
+        let left = (0..WIDTH / 2).filter(|x| is_marked(*x, HEIGHT / 2)).count();
+        let top = (0..HEIGHT).filter(|y| is_marked(WIDTH - 9, *y)).count();
+        (left, top)
+    };
+    assert_eq!(marked(0.0), (0, 0));
+    assert_eq!(marked(2.0), (12, 12));
+    assert_eq!(marked(4.0), (24, 24));
+    let mut hud = Hud::default();
+    hud.set_view(HudView::Disocclusion);
+    let mut picture = gray(ColorFormat::Rgba8);
+    hud.draw(&presented(FrameKind::Real, 0), engine.inspect(), &mut picture);
+    assert_eq!(bytes(&picture), bytes(&gray(ColorFormat::Rgba8)), "at a key nothing is filled");
+}
+
+#[test]
+fn shares_of_models_add_up() {
+    let engine = engine();
+    assert_eq!(engine.inspect().unwrap().rung_percent(), [("linear", 100.0)]);
+}
+
+#[test]
 fn the_bar_of_tear_changes_with_every_frame() {
     let drawn = |index| {
         let mut picture = gray(ColorFormat::Rgba8);

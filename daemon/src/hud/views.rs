@@ -47,6 +47,16 @@ pub(super) fn rungs(inspection: Inspection<'_>, picture: &mut ColorPlane) {
     });
 }
 
+/// What is filled at `phase`, in one colour.
+pub(super) fn disocclusion(inspection: Inspection<'_>, phase: f64, picture: &mut ColorPlane) {
+    let uncovered = inspection.uncovered(phase, BLOCK);
+    let [red, green, blue] = HUES[1];
+    blocks(picture, |x, y| {
+        let is_hole = uncovered.at(x / BLOCK, y / BLOCK);
+        ColorU8::from_rgba(red, green, blue, if is_hole { 255 } else { 0 })
+    });
+}
+
 /// Lines that lay straight at the key and have moved on with the surfaces to `phase`.
 pub(super) fn grid(inspection: Inspection<'_>, phase: f64, picture: &mut ColorPlane) {
     let (width, height) = (picture.width(), picture.height());

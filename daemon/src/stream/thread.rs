@@ -520,6 +520,7 @@ impl StreamThread {
         let sink = self.parts.sink.as_ref().map_or(0, SinkWorker::left_out);
         let fell = backend.fell_back.iter().map(|why| format!("the CPU took over: {why}"));
         let sink = (sink > 0).then(|| format!("the sink was too slow for {sink} frames"));
+        let models = self.core.inspect().map(|it| it.rung_percent()).unwrap_or_default();
         let suspicion = self.suspicion.clone().filter(|found| !found.is_empty());
         let mut report = StreamStatus {
             width: self.parts.create.format.width,
@@ -533,6 +534,10 @@ impl StreamThread {
             ready_before_refresh: self.observed.headroom(),
             keys: [keys.received, keys.superseded, keys.refused + self.refused],
             frames: [frames.real, frames.synthesised, frames.repeated, frames.dropped],
+            models_percent: models
+                .into_iter()
+                .map(|(name, share)| (name.to_owned(), share))
+                .collect(),
             warnings: fell.chain(sink).chain(suspicion).collect(),
             ..StreamStatus::default()
         };

@@ -56,7 +56,7 @@ enum Command {
     },
     /// Draw something into the pictures of windows, as `h` does there.
     Hud {
-        /// off, stats, motion, grid, rungs, tear, only-real or only-synthesised.
+        /// off, stats, motion, grid, rungs, disocclusion, tear, only-real or only-synthesised.
         view: HudView,
     },
     /// Read the daemon's configuration file again.

@@ -62,6 +62,13 @@ pub fn stages(stream: &StreamStatus) -> [(&'static str, Spread); 6] {
     ]
 }
 
+/// Which part of the picture goes on by which model, in one line.
+#[must_use]
+pub fn models(stream: &StreamStatus) -> String {
+    let share = |(name, percent): &(String, f64)| format!("{name} {percent:.0} %");
+    stream.models_percent.iter().map(share).collect::<Vec<_>>().join(", ")
+}
+
 fn stream_text(stream: &StreamStatus) -> String {
     let mut out = title(stream);
     let rates = &stream.rates_hz;
@@ -90,6 +97,9 @@ fn stream_text(stream: &StreamStatus) -> String {
         "\n  since the start: {received} keys ({superseded} superseded, {refused} refused); \
          {real} real, {synthesised} synthesised, {repeated} repeated, {dropped} dropped"
     );
+    if !stream.models_percent.is_empty() {
+        let _infallible = write!(out, "\n  models: {}", models(stream));
+    }
     for warning in &stream.warnings {
         let _infallible = write!(out, "\n  warning: {warning}");
     }

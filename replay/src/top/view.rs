@@ -10,7 +10,7 @@ use ratatui::widgets::{Bar, BarChart, BarGroup, Block, Paragraph, Row, Sparkline
 use super::text;
 
 /// Rows that one stream takes.
-const STREAM_ROWS: u16 = 13;
+const STREAM_ROWS: u16 = 14;
 
 /// What was seen of a stream over time, newest last.
 #[derive(Clone, Debug, Default)]
@@ -46,7 +46,7 @@ fn draw_stream(frame: &mut Frame<'_>, area: Rect, stream: &StreamStatus, history
     let block = Block::bordered().title(text::title(stream));
     let inner = block.inner(area);
     frame.render_widget(block, area);
-    let rows = [Constraint::Length(2), Constraint::Min(0), Constraint::Length(1)];
+    let rows = [Constraint::Length(3), Constraint::Min(0), Constraint::Length(1)];
     let [rates, middle, last] = Layout::vertical(rows).areas(inner);
     frame.render_widget(Paragraph::new(rate_lines(stream)), rates);
     let columns = [Constraint::Length(38), Constraint::Length(34), Constraint::Min(0)];
@@ -85,6 +85,7 @@ fn rate_lines(stream: &StreamStatus) -> Vec<Line<'static>> {
              frames dropped",
             stream.frames[3]
         )),
+        Line::raw(format!("models: {}", text::models(stream))),
     ]
 }
 
@@ -150,6 +151,7 @@ mod tests {
             ready_before_refresh: [0, 3, 9, 88, 20, 8],
             keys: [400, 2, 1],
             frames: [398, 790, 5, 7],
+            models_percent: vec![("linear".to_owned(), 87.5), ("hold".to_owned(), 12.5)],
             warnings: vec!["the CPU took over: device lost".to_owned()],
             ..StreamStatus::default()
         }
@@ -169,6 +171,7 @@ mod tests {
             "late",
             "88",
             "device lost",
+            "models: linear 88 %, hold 12 %",
             "400 keys, 2 superseded, 1 refused; 7 frames dropped",
         ] {
             assert!(screen.contains(expected), "`{expected}` is not on\n{screen}");

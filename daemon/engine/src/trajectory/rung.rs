@@ -21,3 +21,19 @@ pub enum Rung {
     /// It goes on by what the last two pictures show of it, where its motion does not explain them.
     Flow,
 }
+
+impl Rung {
+    /// Name in reports, that of the method that takes it everywhere.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Hold => "hold",
+            Self::Global => "global",
+            Self::Linear => "linear",
+            Self::Affine => "affine",
+            Self::Quadratic => "quadratic",
+            Self::World(_) => "world",
+            Self::Flow => "flow",
+        }
+    }
+}

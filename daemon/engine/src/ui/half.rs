@@ -20,7 +20,6 @@ fn magnitude(bits: u16) -> u64 {
 
 /// The half nearest to `value` steps of 2^-48, ties to even, the largest one beyond it.
 #[inline(always)]
-#[expect(clippy::cast_possible_truncation, reason = "at most the bits of the largest half")]
 fn nearest(value: i128) -> u16 {
     let (sign, value) = (if value < 0 { SIGN } else { 0 }, value.unsigned_abs());
     // Bits below the 11 that are kept, or below the smallest half.
