@@ -12,7 +12,7 @@ use crate::trajectory::effective::EFFECTIVE;
 use crate::warp::blend::BLEND;
 use crate::warp::gather::GATHER;
 use crate::warp::grid::GRID;
-use crate::warp::linear::LINEAR;
+use crate::warp::linear::{LINEAR, PREVIOUS};
 use crate::warp::resolve::{CLASSIFY, RESOLVE};
 use crate::warp::scatter::{SCATTER, SOURCE};
 
@@ -52,6 +52,7 @@ pub const KERNELS: &[Kernel] = &[
     exact("fill/far_side", "far_side", Some(&FAR_SIDE)),
     exact("warp/resolve", "classify", Some(&CLASSIFY)),
     exact("warp/linear", "warp_linear", Some(&LINEAR)),
+    exact("warp/linear", "has_previous", Some(&PREVIOUS)),
     exact("warp/grid", "warp_grid", Some(&GRID)),
     exact("warp/voxel", "warp_voxel", None),
     exact("finish/pyramid", "pyramid", Some(&PYRAMID)),

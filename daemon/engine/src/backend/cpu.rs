@@ -53,7 +53,7 @@ impl CpuBackend {
                     self.linear.take_velocity(pool, &self.effective);
                 }
                 // A phase other than 0 needs motion, and with motion `linear` has taken the key.
-                warp_linear(pool, key, map, phase, &mut self.linear, out);
+                warp_linear(pool, key, previous, map, phase, &mut self.linear, out);
             }
             _ => out.copy_from(&key.color),
         }

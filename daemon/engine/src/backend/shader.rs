@@ -111,6 +111,8 @@ pub enum Slot {
     BesideColumns,
     /// The broken cells.
     Broken,
+    /// Depth key of the key before, then how far the newest key's cells came since.
+    Was,
     /// Vertices of the mesh.
     Vertices,
     /// Which way its cells are cut.

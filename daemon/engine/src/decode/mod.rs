@@ -140,6 +140,7 @@ pub fn decode_key(
     key.camera = input.camera;
     key.motion_from_camera = input.motion_from_camera;
     key.acceleration.resize(0, 0);
+    key.came.resize(0, 0);
     key.displacement.resize(0, 0);
     key.valid =
         color::decode_color(pool, format, &planes.color, &mut scratch.color, &mut key.color);

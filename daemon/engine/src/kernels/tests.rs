@@ -12,6 +12,7 @@ use super::*;
 use crate::backend::shader::{Binding, COLOR, COMMON, FIELD, STRIP};
 use crate::params::FrameParams;
 use crate::warp::grid::TRIANGLE_BYTES;
+use crate::warp::linear::HOLES;
 
 fn src() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
@@ -80,7 +81,7 @@ fn every_wgsl_file_is_part_of_a_shader_in_the_table() {
         assert_eq!(shader.parts.last(), Some(&own.as_str()), "{}", shader.file);
         assert_eq!(shader.parts.first(), Some(&COMMON), "{}", shader.file);
         for part in &shader.parts[1..shader.parts.len() - 1] {
-            assert!([COLOR, FIELD].contains(part), "{}", shader.file);
+            assert!([COLOR, FIELD, HOLES].contains(part), "{}", shader.file);
         }
     }
 }
@@ -219,6 +220,7 @@ fn constants_of_the_shaders_are_those_of_the_cpu() {
         ("NO_ROW", i64::from(NO_ROW)),
         ("LIST_GROUP", i64::from(LINEAR.entries[1].workgroup[0])),
         ("STRIP", i64::from(STRIP)),
+        ("DEPTH_SHIFT", i64::from(crate::warp::linear::DEPTH_SHIFT)),
         ("GROUPS_OF_A_ROW", 1024),
         ("NO_TRIANGLE", i64::from(u32::MAX)),
         ("LANES", i64::from(LANES)),

@@ -424,6 +424,9 @@ impl Ladder {
                 }
             },
         );
+        if is_decoded && key.came.data().is_empty() {
+            std::mem::swap(&mut key.came, &mut key.velocity);
+        }
         dilate_cells(pool, &key.depth, &self.velocity, &mut key.velocity);
         if accelerates.into_inner() {
             dilate_cells(pool, &key.depth, &self.acceleration, &mut key.acceleration);

@@ -39,7 +39,7 @@ use crate::trajectory::effective::EFFECTIVE;
 use crate::warp::blend::BLEND;
 use crate::warp::gather::GATHER;
 use crate::warp::grid::{GRID, LANES, MeshWords, TRIANGLE_BYTES};
-use crate::warp::linear::LINEAR;
+use crate::warp::linear::{LINEAR, PREVIOUS, came, has_previous};
 use crate::warp::resolve::{CLASSIFY, RESOLVE};
 use crate::warp::scatter::{SCATTER, SOURCE};
 use device::Compiled;
@@ -73,6 +73,14 @@ fn frame_shaders(method: Method) -> &'static [&'static Shader] {
     }
 }
 
+/// The shaders that fill its holes from the key before, where that may be.
+fn filling_shaders(method: Method) -> &'static [&'static Shader] {
+    match method {
+        Method::Linear => &[&PREVIOUS],
+        _ => &[],
+    }
+}
+
 /// The shaders that finish a frame, in order.
 const FINISH_SHADERS: [&Shader; 2] = [&PYRAMID, &COMPENSATE];
 
@@ -90,6 +98,7 @@ pub(crate) struct GpuBackend {
     key_steps: Vec<Step>,
     accelerating_steps: Vec<Step>,
     frame_steps: Vec<Step>,
+    filling_steps: Vec<Step>,
     /// Empty in a stream that is not finished.
     finish_steps: Vec<Step>,
     /// Whether the light of levels is on the device.
@@ -100,6 +109,9 @@ pub(crate) struct GpuBackend {
     download: Download,
     /// The field map as the shaders read it.
     tables: Vec<u32>,
+    /// Depth of the newest key that went up, and of the one before: [`Slot::Was`] begins with that.
+    depth: Vec<u32>,
+    was: Vec<u32>,
     mesh: MeshWords,
 }
 
@@ -123,6 +135,7 @@ impl GpuBackend {
             key_steps: steps(key_shaders(method))?,
             accelerating_steps: steps(accelerating_shaders(method))?,
             frame_steps: steps(frame_shaders(method))?,
+            filling_steps: steps(filling_shaders(method))?,
             finish_steps: if finishes { steps(&FINISH_SHADERS)? } else { Vec::new() },
             has_lights: false,
             planes: Planes::default(),
@@ -130,6 +143,8 @@ impl GpuBackend {
             color_upload: Upload::default(),
             download: Download::default(),
             tables: Vec::new(),
+            depth: Vec::new(),
+            was: Vec::new(),
             mesh: MeshWords::default(),
         })
     }
@@ -148,9 +163,13 @@ impl GpuBackend {
         }
         let gpu = Arc::clone(&self.gpu);
         gpu.guard(|| {
-            if self.method == Method::Blend {
+            if matches!(self.method, Method::Blend | Method::Linear) {
                 self.planes.swap(Slot::Color, Slot::Older);
-            } else {
+            }
+            if self.method == Method::Linear {
+                self.send_past(key)?;
+            }
+            if self.method != Method::Blend {
                 self.send_field(key, map)?;
             }
             self.send_color(key)
@@ -201,6 +220,21 @@ impl GpuBackend {
         Ok(())
     }
 
+    /// Sends what holes after `key` read of the key before, whose depth is at hand.
+    fn send_past(&mut self, key: &KeyFrame) -> Result<(), GpuError> {
+        let gpu = Arc::clone(&self.gpu);
+        std::mem::swap(&mut self.depth, &mut self.was);
+        self.depth.clear();
+        self.depth.extend_from_slice(key.depth.data());
+        if self.was.len() == self.depth.len() && !self.was.is_empty() {
+            let cells = self.was.as_bytes().len() as u64;
+            let past = self.planes.sized(&gpu, Slot::Was, 2 * cells)?;
+            gpu.queue.write_buffer(past, 0, self.was.as_bytes());
+            gpu.queue.write_buffer(past, cells, came(key).data().as_bytes());
+        }
+        Ok(())
+    }
+
     fn send_color(&mut self, key: &KeyFrame) -> Result<(), GpuError> {
         let gpu = Arc::clone(&self.gpu);
         let mut commands = gpu.device.create_command_encoder(&Default::default());
@@ -245,6 +279,7 @@ impl GpuBackend {
                     | Slot::QuarterLevel
                     | Slot::SmoothLevel
                     | Slot::Lights
+                    | Slot::Was
                     | Slot::Out => continue,
                 };
                 self.planes.sized(&self.gpu, slot, size)?;
@@ -305,6 +340,9 @@ impl GpuBackend {
                 dispatch(&gpu, &mut commands, &self.accelerating_steps, &self.planes, &params)?;
             }
             dispatch(&gpu, &mut commands, &self.frame_steps, &self.planes, &params)?;
+            if frame.previous.is_some_and(|older| has_previous(frame.newest, older)) {
+                dispatch(&gpu, &mut commands, &self.filling_steps, &self.planes, &params)?;
+            }
             if frame.finish.is_some() {
                 dispatch(&gpu, &mut commands, &self.finish_steps, &self.planes, &params)?;
             }

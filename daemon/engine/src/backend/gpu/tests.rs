@@ -114,6 +114,39 @@ fn assert_same(gpu: &Arc<Gpu>, method: Method, key: &KeyFrame, what: &str) {
 }
 
 #[test]
+fn every_adapter_fills_holes_from_the_key_before_as_the_cpu_does() {
+    let cases = [([64, 40], [64, 40], 6), ([213, 120], [142, 80], 20), ([213, 120], [54, 30], 40)];
+    for gpu in test_gpus("every_adapter_fills_holes_from_the_key_before_as_the_cpu_does") {
+        for (seed, (size, cells, reach)) in (0..).zip(cases) {
+            for format in FORMATS {
+                let of = |seed: u32| {
+                    key(
+                        noise(format, size[0], size[1], seed),
+                        depth_noise(cells[0], cells[1], 3),
+                        velocity_noise(cells[0], cells[1], reach, seed),
+                    )
+                };
+                let older = KeyFrame { content_time: MonoTime::ZERO, ..of(seed + 10) };
+                let newest =
+                    KeyFrame { came: velocity_noise(cells[0], cells[1], 1, 2), ..of(seed) };
+                let unlike = KeyFrame { motion_from: None, ..older.clone() };
+                let mut is_filled = false;
+                let keys = [&older, &newest];
+                let pictures = on_gpu(&gpu, Method::Linear, &keys, phases());
+                for (phase, picture) in phases().zip(pictures) {
+                    let expected = on_cpu(Method::Linear, &keys, phase);
+                    let found = difference(&picture, &expected);
+                    assert_eq!(found, None, "{size:?} over {cells:?}, {format:?}");
+                    let without = on_cpu(Method::Linear, &[&unlike, &newest], phase);
+                    is_filled |= difference(&expected, &without).is_some();
+                }
+                assert!(is_filled, "the key before makes a difference");
+            }
+        }
+    }
+}
+
+#[test]
 fn every_adapter_warps_noise_as_the_cpu_does() {
     // Size of the picture, of the field, speed in pixels.
     let cases = [

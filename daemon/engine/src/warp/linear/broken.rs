@@ -7,7 +7,7 @@
 mod avx2;
 
 use super::cpu::Frame;
-use super::fill::{FarSurface, far_surface, hole_place};
+use super::fill::{FarSurface, HolePlace, far_surface, hole_place};
 use crate::key::Velocity;
 #[cfg(target_arch = "x86_64")]
 use crate::simd::has_avx2;
@@ -26,6 +26,8 @@ pub(super) struct BrokenRow {
     pixels: Vec<[u16; 2]>,
     /// Where each is read, Q8 pixels.
     places: Vec<[i32; 2]>,
+    /// Those that are read in the key before, and where.
+    older: Vec<(u16, [i32; 2])>,
 }
 
 impl BrokenRow {
@@ -34,6 +36,7 @@ impl BrokenRow {
     pub(super) fn update(&mut self, frame: &Frame<'_>, index_y: u32) {
         self.pixels.clear();
         self.places.clear();
+        self.older.clear();
         let classes = frame.field.class.row(frame.map.y.cell_of(index_y));
         for (group, classes) in classes.chunks(CLASSES).enumerate() {
             let is_broken = |class: &CellClass| *class == CellClass::Broken;
@@ -52,7 +55,9 @@ impl BrokenRow {
         #[cfg(target_arch = "x86_64")]
         if has_avx2() {
             // SAFETY: the processor has AVX2, asked for just above.
-            unsafe { avx2::places(frame, index_y, &self.pixels, &mut self.places) };
+            unsafe {
+                avx2::places(frame, index_y, &self.pixels, &mut self.places, &mut self.older);
+            };
             return;
         }
         let mut holes = Holes::new(frame, index_y);
@@ -60,8 +65,13 @@ impl BrokenRow {
             let [column, cell] = pixel.map(u32::from);
             let p = frame.centre([column, index_y]);
             let found = place(frame, [cell, holes.cell_y], p);
-            self.places.push(found.unwrap_or_else(|| holes.place(pixel)));
+            self.places.push(found.unwrap_or_else(|| holes.place(pixel, &mut self.older)));
         }
+    }
+
+    /// The pixels that are read in the key before: column and place.
+    pub(super) fn older(&self) -> impl Iterator<Item = (u16, [i32; 2])> {
+        self.older.iter().copied()
     }
 
     /// Takes the pixels before column `end` off the front of `rest`, which starts as all of them:
@@ -96,13 +106,20 @@ impl<'a> Holes<'a> {
     }
 
     /// Where the pixel in `column` and `cell`, to which no candidate comes, is read.
-    fn place(&mut self, [column, cell]: [u16; 2]) -> [i32; 2] {
+    fn place(&mut self, [column, cell]: [u16; 2], older: &mut Vec<(u16, [i32; 2])>) -> [i32; 2] {
         let far = match self.last {
             Some((last, far)) if last == cell => far,
             _ => far_surface(self.frame, [u32::from(cell), self.cell_y]),
         };
         self.last = Some((cell, far));
-        hole_place(self.frame, far, self.frame.centre([u32::from(column), self.index_y]))
+        let p = self.frame.centre([u32::from(column), self.index_y]);
+        match hole_place(self.frame, far, p) {
+            HolePlace::Key(place) => place,
+            HolePlace::Older(place) => {
+                older.push((column, place));
+                p
+            }
+        }
     }
 }
 

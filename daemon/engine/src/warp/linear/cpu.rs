@@ -7,19 +7,21 @@ use rayon::ThreadPool;
 use super::LinearScratch;
 use super::between::RowCells;
 use super::broken::BrokenRow;
+use super::previous::{Previous, came, has_previous};
 use crate::color::{ColorPlane, Texel};
 use crate::field::FieldMap;
 use crate::key::{KeyFrame, Velocity};
 use crate::phase::Phase;
 use crate::plane::{Plane, Rect};
 use crate::warp::for_each_valid_row;
-use crate::warp::sample::{Listed, sample_run};
+use crate::warp::sample::{Listed, sample, sample_run};
 
-/// Warps `key` to `phase` into `out`, which has the key's size and format. `map` is the map of
-/// the key's field grid; `scratch` has taken the key.
+/// Warps `key` to `phase` into `out`, which has the key's size and format. `previous` is the key
+/// before, `map` the map of the key's field grid; `scratch` has taken the key.
 pub fn warp_linear(
     pool: &ThreadPool,
     key: &KeyFrame,
+    previous: Option<&KeyFrame>,
     map: &FieldMap,
     phase: Phase,
     scratch: &mut LinearScratch,
@@ -30,11 +32,20 @@ pub fn warp_linear(
         return;
     }
     scratch.resolve(pool, map, phase);
-    let frame = Frame::new(scratch, map, key.valid, phase);
-    match (&key.color, out) {
-        (ColorPlane::Rgba8(color), ColorPlane::Rgba8(out)) => gather(pool, &frame, color, out),
-        (ColorPlane::Rgb10a2(color), ColorPlane::Rgb10a2(out)) => gather(pool, &frame, color, out),
-        (ColorPlane::Rgba16f(color), ColorPlane::Rgba16f(out)) => gather(pool, &frame, color, out),
+    let previous = previous.filter(|older| has_previous(key, older));
+    let mut frame = Frame::new(scratch, map, key.valid, phase);
+    frame.previous = previous.map(|older| Previous { depth: &older.depth, came: came(key) });
+    let older = previous.map_or(&key.color, |older| &older.color);
+    match (&key.color, older, out) {
+        (ColorPlane::Rgba8(color), ColorPlane::Rgba8(older), ColorPlane::Rgba8(out)) => {
+            gather(pool, &frame, [color, older], out);
+        }
+        (ColorPlane::Rgb10a2(color), ColorPlane::Rgb10a2(older), ColorPlane::Rgb10a2(out)) => {
+            gather(pool, &frame, [color, older], out);
+        }
+        (ColorPlane::Rgba16f(color), ColorPlane::Rgba16f(older), ColorPlane::Rgba16f(out)) => {
+            gather(pool, &frame, [color, older], out);
+        }
         _ => unreachable!("the engine gives the output the format of the key"),
     }
 }
@@ -54,6 +65,8 @@ pub(super) struct Frame<'a> {
     pub(super) phase: Phase,
     /// Mean of a cell's width and height, Q8 pixels.
     pub(super) one_cell: i32,
+    /// The key before, where holes may be filled from that.
+    pub(super) previous: Option<Previous<'a>>,
 }
 
 /// The surface that the key shows at a place.
@@ -63,14 +76,19 @@ pub(super) struct Surface {
     pub(super) velocity: Velocity,
 }
 
-fn gather<T: Texel>(pool: &ThreadPool, frame: &Frame<'_>, color: &Plane<T>, out: &mut Plane<T>) {
+fn gather<T: Texel>(
+    pool: &ThreadPool,
+    frame: &Frame<'_>,
+    [color, older]: [&Plane<T>; 2],
+    out: &mut Plane<T>,
+) {
     for_each_valid_row(
         pool,
         frame.valid,
         color,
         out,
         #[inline(always)]
-        |index_y, row| gather_row(frame, color, index_y, row),
+        |index_y, row| gather_row(frame, [color, older], index_y, row),
     );
 }
 
@@ -90,7 +108,12 @@ thread_local! {
 
 /// One row of the valid rectangle.
 #[inline(always)]
-fn gather_row<T: Texel>(frame: &Frame<'_>, color: &Plane<T>, index_y: u32, row: &mut [T]) {
+fn gather_row<T: Texel>(
+    frame: &Frame<'_>,
+    [color, older]: [&Plane<T>; 2],
+    index_y: u32,
+    row: &mut [T],
+) {
     // Taken and put back, as a closure given to the thread's storage is not made for AVX2.
     let mut scratch = ROW.take();
     scratch.cells.update(frame, index_y);
@@ -100,6 +123,9 @@ fn gather_row<T: Texel>(frame: &Frame<'_>, color: &Plane<T>, index_y: u32, row: 
         let first = block * BLOCK as u32;
         let broken = scratch.broken.take(&mut rest, first + texels.len() as u32);
         gather_block(frame, color, &scratch.cells, broken, [first, index_y], texels);
+    }
+    for (column, place) in scratch.broken.older() {
+        row[column as usize] = sample(older, frame.valid, place[0], place[1]);
     }
     ROW.set(scratch);
 }
@@ -148,7 +174,7 @@ impl<'a> Frame<'a> {
             [field.class.width(), field.class.height()],
         ];
         assert_eq!(sizes, [cells; 4], "every plane of the field has the size of its grid");
-        Self { field, map, valid, phase, one_cell: one_cell(map) }
+        Self { field, map, valid, phase, one_cell: one_cell(map), previous: None }
     }
 
     /// Centre of a pixel that is counted from the top left of the valid rectangle, Q8.

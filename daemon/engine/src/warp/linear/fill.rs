@@ -1,4 +1,4 @@
-//! What a hole shows: (3) and (4) of [`super`].
+//! What a hole shows: (3) to (5) of [`super`].
 
 use super::cpu::Frame;
 use crate::fill::far_side::NO_CELL;
@@ -10,8 +10,8 @@ use crate::warp::scatter::{NO_SOURCE, source_of};
 pub(super) struct FarSurface {
     /// The cell, and the source that it shows.
     cell: u32,
-    source: u32,
-    depth: u32,
+    pub(super) source: u32,
+    pub(super) depth: u32,
     displacement: [i32; 2],
 }
 
@@ -27,15 +27,36 @@ pub(super) fn far_surface(frame: &Frame<'_>, cell: [u32; 2]) -> Option<FarSurfac
     })
 }
 
-/// Where in the key pixel centre `p` of a hole is read.
-pub(super) fn hole_place(frame: &Frame<'_>, far: Option<FarSurface>, p: [i32; 2]) -> [i32; 2] {
-    let Some(FarSurface { cell, source, depth, displacement: [dx, dy] }) = far else { return p };
+/// Where pixel centre `p` of a hole is read.
+pub(super) fn hole_place(frame: &Frame<'_>, far: Option<FarSurface>, p: [i32; 2]) -> HolePlace {
+    let Some(far) = far else { return HolePlace::Key(p) };
+    let [dx, dy] = far.displacement;
     // (3)
     let q = clamp(frame, [p[0] - dx, p[1] - dy]);
-    if is_far(frame, q, depth) {
-        return far_place(frame, q, depth);
+    if is_far(frame, q, far.depth) {
+        return HolePlace::Key(far_place(frame, q, far.depth));
     }
     // (4)
+    let older = frame.previous.as_ref();
+    let older = older.and_then(|older| older.place(frame, &far, [p[0] - dx, p[1] - dy]));
+    if let Some(place) = older {
+        return HolePlace::Older(place);
+    }
+    // (5)
+    HolePlace::Key(stretched(frame, far, p))
+}
+
+/// Where a hole is read.
+pub(super) enum HolePlace {
+    /// In the key.
+    Key([i32; 2]),
+    /// In the key before.
+    Older([i32; 2]),
+}
+
+/// (5).
+fn stretched(frame: &Frame<'_>, far: FarSurface, p: [i32; 2]) -> [i32; 2] {
+    let FarSurface { cell, source, depth, displacement: [dx, dy] } = far;
     let (width, map) = (frame.field.splat.width(), frame.map);
     let within = |p: i32, centre: i32, cell_px: i32| p.clamp(centre - cell_px, centre + cell_px);
     let half = frame.one_cell >> 1;
@@ -73,7 +94,7 @@ fn far_cell(frame: &Frame<'_>, [cell_x, cell_y]: [u32; 2]) -> Option<u32> {
 }
 
 /// Clamps to the pixel centres of the valid rectangle.
-fn clamp(frame: &Frame<'_>, q: [i32; 2]) -> [i32; 2] {
+pub(super) fn clamp(frame: &Frame<'_>, q: [i32; 2]) -> [i32; 2] {
     let valid = frame.valid;
     let bound = |q: i32, start: u32, length: u32| {
         q.clamp((start << 8).cast_signed(), ((start + length - 1) << 8).cast_signed())
@@ -94,6 +115,6 @@ fn far_place(frame: &Frame<'_>, q: [i32; 2], depth: u32) -> [i32; 2] {
     if mixes_near { nearest_pixel(q) } else { q }
 }
 
-fn nearest_pixel(q: [i32; 2]) -> [i32; 2] {
+pub(super) fn nearest_pixel(q: [i32; 2]) -> [i32; 2] {
     q.map(|q| (q + 128) & !0xff)
 }

@@ -13,14 +13,16 @@
 //!                   out(p) = key(q) of that one
 //! (3) no such n:    a hole. f = the far side. q = p - d(v_f), clamped to the valid rectangle
 //!                   out(p) = key(q) where near(q) is not nearer than f
-//! (4) else          out(p) = key's pixel where the pixel of f closest to p came from
+//! (4) else          out(p) = before(q - D_f) where the key before has the depth of f there; D_f how
+//!                   far f came since
+//! (5) else          out(p) = key's pixel where the pixel of f closest to p came from
 //! ```
 //!
 //! (2) asks the key itself whether the surface of a candidate is what p would show: a field
 //! coarser than colour, the 2x2 footprint and dilation all reach farther than surfaces do. (3)
-//! continues the far surface under what used to hide it; where it is still hidden in the key, (4)
-//! stretches its last visible pixel. Neither reads between two pixels unless both are far, so a
-//! hole never shows the nearer surface.
+//! continues the far surface under what used to hide it; where it is still hidden in the key, (4) shows
+//! what the key before saw of it, and where that saw nothing either, (5) stretches its last visible
+//! pixel. None reads between two pixels unless both are far, so a hole never shows the nearer surface.
 //!
 //! Edges: reads are clamped to the valid rectangle; what comes in over the border is a hole.
 //! Phase 0 gives the key. Exactness: `Exact`.
@@ -30,10 +32,12 @@ mod broken;
 mod cpu;
 mod fill;
 mod gpu;
+mod previous;
 mod scratch;
 #[cfg(test)]
 mod tests;
 
 pub use cpu::{one_cell, warp_linear};
-pub use gpu::LINEAR;
+pub use gpu::{HOLES, LINEAR, PREVIOUS};
+pub use previous::{DEPTH_SHIFT, came, has_previous};
 pub use scratch::LinearScratch;

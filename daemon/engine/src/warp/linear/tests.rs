@@ -1,10 +1,13 @@
 //! What the linear method shows where surfaces move apart.
 
+use super::{LinearScratch, warp_linear};
 use crate::color::{ColorFormat, ColorPlane, Rgba8};
+use crate::key::KeyFrame;
 use crate::method::Method;
 use crate::phase::Phase;
 use crate::plane::Plane;
-use crate::testing::{hash, key, noise, plane, px, warp, words};
+use crate::testing::{hash, key, map_of, noise, plane, pool, px, warp, words};
+use crate::time::MonoTime;
 
 const WIDTH: u32 = 64;
 const HEIGHT: u32 = 32;
@@ -17,7 +20,7 @@ fn is_near(x: u32, y: u32, size: u32) -> bool {
 }
 
 /// A near square that moves before far texture without any red; field at 1 / `ratio`.
-fn square(ratio: u32, size: u32, v: (f32, f32)) -> crate::key::KeyFrame {
+fn square(ratio: u32, size: u32, v: (f32, f32)) -> KeyFrame {
     let color = ColorPlane::Rgba8(plane(WIDTH, HEIGHT, |x, y| {
         Rgba8(if is_near(x, y, size) { NEAR } else { 0xff00_0000 | (hash(x, y, 3) & 0x00ff_ff00) })
     }));
@@ -148,5 +151,55 @@ fn without_depth_the_faster_surface_is_taken_as_nearer() {
         for x in 23..33 {
             assert_eq!(out.at(x, y) & 0xff, 0, "and leaves nothing behind at {x}, {y}");
         }
+    }
+}
+
+/// The square's picture and the one before it, a span earlier, over the same wall.
+fn two_squares(v: (f32, f32)) -> [KeyFrame; 2] {
+    let newest = square(1, 8, v);
+    let was = |x: u32, y: u32| is_near(x + v.0 as u32, y + v.1 as u32, 8);
+    let older = KeyFrame {
+        color: ColorPlane::Rgba8(plane(WIDTH, HEIGHT, |x, y| {
+            Rgba8(if was(x, y) { NEAR } else { wall(x, y) })
+        })),
+        depth: plane(WIDTH, HEIGHT, |x, y| if was(x, y) { 1_000_000 } else { FAR }),
+        content_time: MonoTime::ZERO,
+        motion_from: Some(MonoTime::ZERO),
+        ..newest.clone()
+    };
+    let newest = KeyFrame {
+        content_time: MonoTime::from_ns(1),
+        motion_from: Some(MonoTime::ZERO),
+        ..newest
+    };
+    [older, newest]
+}
+
+fn wall(x: u32, y: u32) -> u32 {
+    0xff00_0000 | (hash(x, y, 3) & 0x00ff_ff00)
+}
+
+/// Pixels of the square's place in the key that do not show the wall after it has gone.
+fn wrong_pixels([older, newest]: &[KeyFrame; 2]) -> usize {
+    let (pool, map) = (pool(2), map_of(newest));
+    let (mut out, mut scratch) = (newest.color.clone(), LinearScratch::default());
+    scratch.take_key(&pool, newest);
+    warp_linear(&pool, newest, Some(older), &map, Phase::ONE, &mut scratch, &mut out);
+    let out = words(&out);
+    let places = (8..16).flat_map(|y| (24..32).map(move |x| (x, y)));
+    places.filter(|(x, y)| out.at(*x, *y) != wall(*x, *y)).count()
+}
+
+#[test]
+fn a_hole_shows_what_the_key_before_saw_there_where_its_depth_agrees() {
+    let seen = two_squares((12.0, 0.0));
+    assert_eq!(wrong_pixels(&seen), 0);
+    let [older, newest] = seen;
+    // Neither another depth, nor another time, nor a picture without motion.
+    let nearer = KeyFrame { depth: plane(WIDTH, HEIGHT, |_, _| FAR + 100), ..older.clone() };
+    let earlier = KeyFrame { content_time: MonoTime::from_ns(2), ..older.clone() };
+    let first = KeyFrame { motion_from: None, ..older.clone() };
+    for other in [nearer, earlier, first] {
+        assert!(wrong_pixels(&[other, newest.clone()]) > 50, "a stretched wall is another");
     }
 }

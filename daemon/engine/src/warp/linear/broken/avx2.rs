@@ -46,6 +46,7 @@ pub(super) fn places(
     index_y: u32,
     pixels: &[[u16; 2]],
     places: &mut Vec<[i32; 2]>,
+    older: &mut Vec<(u16, [i32; 2])>,
 ) {
     let mut holes = Holes::new(frame, index_y);
     let cell_y = holes.cell_y;
@@ -60,7 +61,7 @@ pub(super) fn places(
             // SAFETY: both members are 32 bytes that any value may have.
             let (place, found) =
                 unsafe { ([xs.lanes[i], ys.lanes[i]], found.lanes[i].cast_unsigned()) };
-            places.push(if found == u32::MAX { holes.place(*pixel) } else { place });
+            places.push(if found == u32::MAX { holes.place(*pixel, older) } else { place });
         }
     }
 }
