@@ -436,3 +436,35 @@ fn a_ui_plane_that_does_not_fit_costs_itself_and_one_of_another_format_its_strea
         |message: &DaemonMessage| matches!(message, DaemonMessage::Error(it) if it.is_fatal);
     assert!(said.iter().any(is_fatal), "{said:?}");
 }
+
+#[test]
+fn a_client_whose_picture_stands_still_is_told_to_render_it_whole_and_no_oftener_than_it_can() {
+    let args = foreframed::Args { ppd: Some(40.0), ..Default::default() };
+    let daemon = RunningDaemon::start_with("null", args);
+    let mut client = daemon.connect();
+    let format = StreamFormat {
+        motion: Some(foreframe_protocol::MotionConvention {
+            format: foreframe_protocol::MotionFormat::Rg16f,
+            direction: foreframe_protocol::MotionDirection::CurrentToPrevious,
+            unit: foreframe_protocol::MotionUnit::Pixels,
+            scale: [1.0; 2],
+            camera_motion: foreframe_protocol::CameraMotion::Included,
+        }),
+        ..StreamFormat::rgba8(64, 32)
+    };
+    let mut source = client.open_stream_of(1, format);
+    let first = source.fill(RED).content_time_ns;
+    for key in 1..=60 {
+        let mut submit = source.fill(RED);
+        submit.content_time_ns = first + key * 1_000_000_000 / 50;
+        submit.motion_from_ns = Some(submit.content_time_ns - 1_000_000_000 / 50);
+        client.send(submit);
+        assert_eq!(client.expect_released(&submit), ReleaseReason::Copied);
+    }
+    let hint = client.expect("a hint", |message| match message {
+        DaemonMessage::Hint(hint) => Some(*hint),
+        _ => None,
+    });
+    assert_eq!((hint.stream, hint.width, hint.height), (1, 64, 32));
+    assert_eq!(hint.key_interval_ns, 20_000_000, "nothing moves: no more than the least rate");
+}

@@ -13,6 +13,12 @@ use crate::trajectory::rung::Rung;
 
 /// Pixels between the samples that shares are counted of, per axis.
 const SHARE_STRIDE: usize = 16;
+/// Columns and rows of the pixels that [`Inspection::speed`] looks at.
+const PROBES: [u32; 2] = [32, 18];
+/// Motion that counts, pixels per motion span.
+const MOVED_PX: f32 = 0.25;
+/// If less than one in so many of those pixels moves, the picture is still.
+const STILL_PART: usize = 16;
 
 /// The newest key, seen pixel by pixel.
 #[derive(Clone, Copy, Debug)]
@@ -32,6 +38,31 @@ impl Inspection<'_> {
         let velocity = self.key.velocity.at(column, row);
         let pixels = |steps: i16| f32::from(steps) / Velocity::PER_PX as f32;
         velocity.is_trackable().then(|| [pixels(velocity.x), pixels(velocity.y)])
+    }
+
+    /// How fast the picture moves, pixels per second: the median speed of what moves, or 0 where nearly
+    /// nothing does. None without motion.
+    #[must_use]
+    #[expect(clippy::cast_possible_truncation, reason = "seconds need no more than an f32")]
+    pub fn speed(&self) -> Option<f32> {
+        let seconds = self.key.motion_span()?.as_secs_f64() as f32;
+        let valid = self.key.valid;
+        let place =
+            |i: u32, of: u32, from: u32, length: u32| from + (2 * i + 1) * length / (2 * of);
+        let [columns, rows] = PROBES;
+        let places = (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y)));
+        let speeds = places.filter_map(|(x, y)| {
+            let x = place(x, columns, valid.x, valid.width);
+            let y = place(y, rows, valid.y, valid.height);
+            self.motion_at(x, y).map(|[dx, dy]| libm::hypotf(dx, dy))
+        });
+        let mut moving: Vec<f32> = speeds.filter(|speed| *speed > MOVED_PX).collect();
+        if moving.len() * STILL_PART < (columns * rows) as usize {
+            return Some(0.0);
+        }
+        let middle = moving.len() / 2;
+        let (_, median, _) = moving.select_nth_unstable_by(middle, f32::total_cmp);
+        Some(*median / seconds)
     }
 
     /// The model that the surface at a pixel goes on by.

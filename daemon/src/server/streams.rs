@@ -8,8 +8,8 @@ use foreframe_engine::{EngineConfig, MonoTime, StreamFormat as EngineFormat};
 use foreframe_protocol::memory::ReadOnlyPool;
 use foreframe_protocol::slots::UiOrder;
 use foreframe_protocol::{
-    CreateStream, EndReason, ErrorCode, ErrorMessage, OutputFrame, Pacing, PlaneKind, Presented,
-    ReleaseReason, SlotReleased, Statistics, StreamEnded,
+    CreateStream, EndReason, ErrorCode, ErrorMessage, Hint, OutputFrame, Pacing, PlaneKind,
+    Presented, ReleaseReason, SlotReleased, Statistics, StreamEnded,
 };
 use tracing::{debug, error, info};
 
@@ -192,6 +192,10 @@ impl Server {
             }
             StreamEvent::Pacing(pacing) => {
                 self.offer(session, Pacing { stream: number, ..pacing });
+            }
+            StreamEvent::Hint(hint) => {
+                debug!(session, ?hint, "hint");
+                self.offer(session, Hint { stream: number, ..hint });
             }
             StreamEvent::Report(report) => {
                 stream.report = *report;

@@ -12,6 +12,7 @@ pub mod allocator;
 pub mod command;
 pub mod core;
 mod display;
+pub mod hints;
 pub mod mailbox;
 pub mod observed;
 pub mod outlet;
@@ -21,7 +22,7 @@ pub mod thread;
 
 use crate::control::StreamStatus;
 use foreframe_protocol::slots::SlotUse;
-use foreframe_protocol::{ErrorMessage, OutputFrame, Pacing, Presented, Statistics};
+use foreframe_protocol::{ErrorMessage, Hint, OutputFrame, Pacing, Presented, Statistics};
 
 /// What a stream's thread tells the main loop, in order.
 #[derive(Clone, PartialEq, Debug)]
@@ -38,6 +39,8 @@ pub enum StreamEvent {
     Statistics(Statistics),
     /// How a key frame met the display. Lacks the stream's number.
     Pacing(Pacing),
+    /// Size and rate that would look best. Lacks the stream's number.
+    Hint(Hint),
     /// What people want to know. Lacks what the main loop knows.
     Report(Box<StreamStatus>),
     /// A frame lies in a slot of an output pool of this session.

@@ -16,7 +16,7 @@ use foreframe_engine::{DecodeError, KeyReport, Method, MonoSpan, MonoTime};
 use foreframe_protocol::slots::Holds;
 use foreframe_protocol::{
     CreateStream, Error, ErrorCode, ErrorMessage, OutputFrame, OutputKind, Pacing, PlaneKind,
-    PlaneMap, Presented, Statistics, StreamFormat,
+    PlaneMap, Presented, Statistics, StreamFormat, Submit,
 };
 use thread_priority::{
     RealtimeThreadSchedulePolicy, ThreadPriority, ThreadPriorityValue, ThreadSchedulePolicy,
@@ -27,6 +27,7 @@ use tracing::{debug, error, info, trace, warn};
 use super::command::StreamCommand;
 use super::core::{CoreConfig, DroppedFrame, FrameKind, FrameOutcome, PresentedFrame, StreamCore};
 use super::display::WindowDisplay;
+use super::hints::Hints;
 use super::mailbox::{Mailbox, Submission, Taken, UiSubmission};
 use super::observed::{KeyInstants, Observed};
 use super::planes::{PlaneCopier, SlotPlanes};
@@ -123,6 +124,8 @@ struct StreamThread {
     key_work: MonoSpan,
     synthesis: Mean,
     observed: Observed,
+    /// Where the model knows how large a pixel is.
+    hints: Option<Hints>,
     statistics_due_at: MonoTime,
 }
 
@@ -149,6 +152,9 @@ impl StreamThread {
                 Err(error) => warn!(%error, "the CPU makes the pictures"),
             }
         }
+        let size = [parts.create.format.width, parts.create.format.height];
+        let CoreConfig { engine, refresh_interval, .. } = parts.core;
+        let hints = Hints::new(size, engine.pixels_per_degree, refresh_interval);
         info!(stream = parts.ordinal, backend = core.backend().name, "stream starts");
         let window = parts.window.as_ref().and_then(|(opener, config)| {
             let mailbox = Arc::clone(&parts.mailbox);
@@ -170,6 +176,7 @@ impl StreamThread {
             key_work: MonoSpan::ZERO,
             synthesis: Mean::default(),
             observed: Observed::default(),
+            hints,
             statistics_due_at: clock::now(),
         }
     }
@@ -279,6 +286,7 @@ impl StreamThread {
             },
         });
         self.send_pacing(submit.key_index);
+        self.send_hint(submit);
         self.look_at_motion();
     }
 
@@ -493,6 +501,18 @@ impl StreamThread {
             slack_ns: slack.as_ns(),
             phase_error_ns: phase_error.as_ns(),
         }));
+    }
+
+    /// Tells what would look best, if that has changed.
+    fn send_hint(&mut self, submit: &Submit) {
+        let (core, valid) = (&self.core, submit.planes.get(PlaneKind::Color).map(|it| it.valid));
+        let pixels = valid.map_or(0, |it| u64::from(it.width) * u64::from(it.height));
+        let content_time = MonoTime::from_ns(submit.content_time_ns);
+        let speed = || core.inspect().and_then(|seen| seen.speed());
+        let hint = self.hints.as_mut().and_then(|it| it.on_key(content_time, pixels, speed));
+        if let Some(hint) = hint {
+            self.send(StreamEvent::Hint(hint));
+        }
     }
 
     fn send_statistics(&self) {
