@@ -8,9 +8,10 @@ use std::path::Path;
 
 use daemon_fixture::{Client, KeySource, RunningDaemon, Screen};
 use foreframe_protocol::{
-    CameraMotion, ColorFormat, DaemonMessage, DestroyStream, EndReason, ErrorCode, ErrorMessage,
-    Goodbye, LateCamera, MotionConvention, MotionDirection, MotionFormat, MotionUnit, OutputKind,
-    OutputReleased, PlaneDescriptor, PlaneKind, PlaneSize, ReleaseReason, StreamFormat, UiPlane,
+    CameraMotion, ColorFormat, CreateStream, DaemonMessage, DestroyStream, EndReason, ErrorCode,
+    ErrorMessage, Goodbye, LateCamera, MotionConvention, MotionDirection, MotionFormat, MotionUnit,
+    OutputKind, OutputReleased, PlaneDescriptor, PlaneKind, PlaneSize, ReleaseReason, StreamFormat,
+    UiPlane,
 };
 use foreframe_replay::recording::Recording as _;
 use foreframe_replay::recording::capture::CaptureRecording;
@@ -415,12 +416,7 @@ fn a_ui_plane_that_does_not_fit_costs_itself_and_one_of_another_format_its_strea
     expect_pixel(&mut client, &screen, [7, 7, 7, 255], &mut seen);
 
     let format = StreamFormat { ui: Some(ColorFormat::Rgba16f), ..StreamFormat::rgba8(8, 8) };
-    let create = foreframe_protocol::CreateStream {
-        stream: 2,
-        format,
-        max_sizes: format.full_sizes(),
-        slots: 3,
-    };
+    let create = CreateStream { stream: 2, format, max_sizes: format.full_sizes(), slots: 3 };
     client.send(create);
     let error = client.expect_error();
     assert!(error.code == ErrorCode::Unsupported && !error.is_fatal, "{error:?}");
@@ -443,12 +439,12 @@ fn a_client_whose_picture_stands_still_is_told_to_render_it_whole_and_no_oftener
     let daemon = RunningDaemon::start_with("null", args);
     let mut client = daemon.connect();
     let format = StreamFormat {
-        motion: Some(foreframe_protocol::MotionConvention {
-            format: foreframe_protocol::MotionFormat::Rg16f,
-            direction: foreframe_protocol::MotionDirection::CurrentToPrevious,
-            unit: foreframe_protocol::MotionUnit::Pixels,
+        motion: Some(MotionConvention {
+            format: MotionFormat::Rg16f,
+            direction: MotionDirection::CurrentToPrevious,
+            unit: MotionUnit::Pixels,
             scale: [1.0; 2],
-            camera_motion: foreframe_protocol::CameraMotion::Included,
+            camera_motion: CameraMotion::Included,
         }),
         ..StreamFormat::rgba8(64, 32)
     };
