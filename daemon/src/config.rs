@@ -56,6 +56,10 @@ pub struct Args {
     /// [default: every refresh]
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub cap: Option<f64>,
+    /// Leave out in-between frames until something has moved by so many pixels, 0 to 16: fewer frames
+    /// where little moves [default: 0, none are left out]
+    #[arg(long, value_name = "PX", allow_negative_numbers = true)]
+    pub least_step: Option<f32>,
     /// What to draw into the pictures of windows: off, stats, motion, grid, rungs, disocclusion, tear,
     /// only-real or only-synthesised; `h` in a window goes through them [default: off]
     #[arg(long, value_name = "VIEW")]
@@ -233,6 +237,8 @@ pub struct Config {
     pub method: Method,
     /// Most frames shown a second, Hz.
     pub cap: Option<f64>,
+    /// In-between frames are left out until something has moved by so many pixels.
+    pub least_step_px: f32,
     /// What is drawn into the pictures of windows.
     pub hud: HudView,
     /// Capture to write.
@@ -285,6 +291,7 @@ impl Args {
             backend: self.backend.or(file.backend),
             method: self.method.or(file.method),
             cap: self.cap.or(file.cap),
+            least_step: self.least_step.or(file.least_step),
             hud: self.hud.or(file.hud),
             record: self.record.or(file.record),
             threads: self.threads.or(file.threads),
@@ -326,6 +333,10 @@ impl Args {
         ensure((1..=1 << 20).contains(&memory_mb), || {
             format!("--memory-mb: expected 1 to 1048576, found {memory_mb}")
         })?;
+        let least_step_px = self.least_step.unwrap_or(0.0);
+        ensure((0.0..=16.0).contains(&least_step_px), || {
+            format!("--least-step: expected 0 to 16 pixels, found {least_step_px}")
+        })?;
         let log = self.log.unwrap_or_else(|| "info".to_owned());
         ensure(EnvFilter::try_new(&log).is_ok(), || {
             format!("--log: expected a level, or a filter such as foreframed=debug, found `{log}`")
@@ -341,6 +352,7 @@ impl Args {
             backend: self.backend.unwrap_or(BackendChoice::Auto),
             method: self.method.unwrap_or_default(),
             cap: self.cap,
+            least_step_px,
             hud: self.hud.unwrap_or_default(),
             record: self.record,
             threads: self.threads.unwrap_or(processors),
@@ -376,6 +388,7 @@ impl Config {
             ("monitor", self.window.monitor != new.window.monitor),
             ("refresh", self.refresh_interval != new.refresh_interval),
             ("backend", self.backend != new.backend),
+            ("least-step", self.least_step_px.to_bits() != new.least_step_px.to_bits()),
             ("threads", self.threads != new.threads),
             ("ppd", self.pixels_per_degree != new.pixels_per_degree),
             ("finish", self.finish.mode != new.finish.mode),
@@ -425,7 +438,7 @@ mod tests {
     }
 
     /// Every option with a value that is not its default, by the name that flag and file share.
-    const EVERY_OPTION: [(&str, &str, &str); 17] = [
+    const EVERY_OPTION: [(&str, &str, &str); 18] = [
         ("socket", "/run/x", "'/run/x'"),
         ("sink", "png:out", "'png:out'"),
         ("fullscreen", "", "true"),
@@ -434,6 +447,7 @@ mod tests {
         ("backend", "cpu", "'cpu'"),
         ("method", "hold", "'hold'"),
         ("cap", "50", "50"),
+        ("least-step", "0.5", "0.5"),
         ("hud", "grid", "'grid'"),
         ("record", "a.mcap", "'a.mcap'"),
         ("threads", "3", "3"),

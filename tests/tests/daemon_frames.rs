@@ -378,6 +378,7 @@ fn replayed(path: &Path, with_ui: bool) -> Vec<Vec<u8>> {
         pixels_per_degree: None,
         late_cameras: Vec::new(),
         finish: foreframe_engine::FinishConfig::default(),
+        least_step_px: 0.0,
     };
     let keys = timed_keys(&mut recording, &reader, &plan, timing);
     let mut seen: Vec<Vec<u8>> = Vec::new();

@@ -124,6 +124,7 @@ impl Server {
                 },
                 refresh_interval: config.frame_interval(),
                 display_origin: self.display_origin,
+                least_step_px: config.least_step_px,
             },
             gpu: chosen.map(|index| (Arc::clone(&self.gpus), index)),
             mailbox: Arc::clone(&mailbox),

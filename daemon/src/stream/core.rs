@@ -27,6 +27,9 @@ pub struct CoreConfig {
     pub refresh_interval: MonoSpan,
     /// An instant of its grid.
     pub display_origin: MonoTime,
+    /// In-between frames are left out until something has moved by so many pixels (Falchetto et al.
+    /// 2007, adaptive ratio). 0 leaves none out.
+    pub least_step_px: f32,
 }
 
 /// What became of one plan.
@@ -115,6 +118,9 @@ enum Display {
 const FIRST_DEADLINE: MonoSpan = MonoSpan::from_ms(4);
 /// The same on fast displays, as a share of the refresh interval.
 const FIRST_DEADLINE_PERCENT: i64 = 55;
+/// A picture is made for one refresh in so many, however slowly things move: about the key interval of
+/// the slowest application on the fastest display.
+const LONGEST_STRIDE: u32 = 8;
 /// Pictures under way at most; a display that answers nothing is not waited for.
 const UNDER_WAY: usize = 64;
 
@@ -151,6 +157,7 @@ pub struct StreamCore {
     under_way: VecDeque<(MonoTime, FrameKind)>,
     frame: ColorPlane,
     counts: FrameCounts,
+    least_step_px: f32,
     newest_key: Option<NewestKey>,
     ui: NewestUi,
     shown: Option<Shown>,
@@ -214,6 +221,7 @@ impl StreamCore {
             under_way: VecDeque::new(),
             frame: ColorPlane::new(format.color, format.width, format.height),
             counts: FrameCounts::default(),
+            least_step_px: config.least_step_px,
             newest_key: None,
             ui: NewestUi::default(),
             shown: None,
@@ -311,7 +319,23 @@ impl StreamCore {
             },
             taken: self.counts.keys,
         });
+        if self.least_step_px > 0.0 {
+            self.pacer.set_stride(self.stride());
+        }
         Ok(report)
+    }
+
+    /// Refreshes in which what moves fastest moves by the least step.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to the longest")]
+    #[expect(clippy::cast_precision_loss, reason = "spans of milliseconds")]
+    fn stride(&self) -> u32 {
+        let span =
+            self.newest_key.and_then(|key| Some(key.content_time - key.previous_content_time?));
+        let fast_px = self.engine.inspect().map_or(0.0, |inspection| inspection.fast_px());
+        let Some(span) = span.filter(|span| *span > MonoSpan::ZERO) else { return 1 };
+        let refreshes = span.as_ns() as f32 / self.interval().as_ns().max(1) as f32;
+        let needed = self.least_step_px * refreshes / fast_px;
+        if needed >= LONGEST_STRIDE as f32 { LONGEST_STRIDE } else { (needed.ceil() as u32).max(1) }
     }
 
     /// Shows a user interface over every picture from now on, unless one that came in later is shown
@@ -323,6 +347,7 @@ impl StreamCore {
         if arrived_at >= self.ui.arrived_at {
             self.engine.set_ui(input)?;
             self.ui = NewestUi { arrived_at, taken: self.ui.taken + 1 };
+            self.pacer.on_news();
         }
         Ok(())
     }

@@ -52,6 +52,10 @@ pub struct Args {
     /// seen.
     #[arg(long, default_value_t = FinishMode::Off)]
     pub finish: FinishMode,
+    /// Leave out in-between frames until something has moved by so many pixels, 0 to 16.
+    #[arg(long, value_name = "PX", default_value_t = 0.0, value_parser = number(0.0, 16.0))]
+    #[arg(allow_negative_numbers = true)]
+    pub least_step: f64,
     /// Display that the output is for: a built-in profile (see `perception displays`) or a file that
     /// ends in .toml. Without --ppd it gives that too, from 65 cm before a screen.
     #[arg(long, value_name = "NAME")]
@@ -139,6 +143,8 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
         },
         late_cameras: timed_poses(&recording.late_cameras(), recording.heads(), &plan, timing),
         finish: FinishConfig::new(args.finish, profile, refresh_interval),
+        #[expect(clippy::cast_possible_truncation, reason = "a number of 0 to 16")]
+        least_step_px: args.least_step as f32,
     };
     let mut sink = Sink::open(&args.sink, reader.format(), refresh_interval, 0)
         .with_context(|| format!("--sink {}", args.sink))?;

@@ -41,6 +41,8 @@ pub struct ReplayConfig {
     pub late_cameras: Vec<TimedPose>,
     /// Whether detail moves from in-between frames to their keys.
     pub finish: FinishConfig,
+    /// In-between frames are left out until something has moved by so many pixels.
+    pub least_step_px: f32,
 }
 
 /// Where an output frame comes from.
@@ -221,6 +223,7 @@ impl VirtualStream {
                 },
                 refresh_interval,
                 display_origin: config.display_origin.unwrap_or(origin),
+                least_step_px: config.least_step_px,
             },
         );
         if let Some(gpu) = &config.gpu {

@@ -58,6 +58,7 @@ fn replayed_plan(
         pixels_per_degree: None,
         late_cameras: Vec::new(),
         finish: FinishConfig::default(),
+        least_step_px: 0.0,
     };
     let mut digester = FrameDigester::default();
     let mut frames = Vec::new();
@@ -207,6 +208,7 @@ fn refreshes_lie_where_the_recording_says() {
             pixels_per_degree: None,
             late_cameras: Vec::new(),
             finish: FinishConfig::default(),
+            least_step_px: 0.0,
         };
         let keys = timed_keys(&mut recording, &reader, &plan, KeyTiming::AsRecorded);
         let mut shown = 0;
@@ -235,6 +237,7 @@ fn an_error_of_the_sink_ends_the_replay() {
         pixels_per_degree: None,
         late_cameras: Vec::new(),
         finish: FinishConfig::default(),
+        least_step_px: 0.0,
     };
     let keys = timed_keys(&mut recording, &reader, &plan, KeyTiming::Stepped);
     let result = replay(*reader.format(), &config, keys, [], |_, _| anyhow::bail!("disk full"));
@@ -266,6 +269,7 @@ fn what_is_repeated_is_the_picture_that_was_shown_and_not_one_that_was_dropped()
         pixels_per_degree: None,
         late_cameras: Vec::new(),
         finish: FinishConfig::default(),
+        least_step_px: 0.0,
     };
     let keys = timed_keys(&mut recording, &reader, &plan, KeyTiming::Stepped);
     let keys: Vec<_> = keys.map(Result::unwrap).take(2).collect();

@@ -67,6 +67,10 @@ pub struct Pacer {
     early_in_a_row: u32,
     /// What the frame that was started last shows.
     in_work: Shows,
+    /// Refreshes from one picture of a key to the next.
+    stride: u32,
+    /// Whether no picture was started since the newest key, or other news.
+    has_news: bool,
     slack: Option<MonoSpan>,
     counts: PacerCounts,
 }
@@ -75,6 +79,17 @@ impl Pacer {
     /// Whether pictures come from between the two newest keys from now on.
     pub fn set_interpolates(&mut self, interpolates: bool) {
         self.interpolates = interpolates;
+    }
+
+    /// Makes a picture for every `refreshes`-th refresh from now on, at least 1, but one that has news,
+    /// as the first of a key may, as soon as ever.
+    pub fn set_stride(&mut self, refreshes: u32) {
+        self.stride = refreshes.max(1);
+    }
+
+    /// The next picture shows more than that things have moved on.
+    pub fn on_news(&mut self) {
+        self.has_news = true;
     }
 
     /// A pacer that has seen nothing.
@@ -96,6 +111,8 @@ impl Pacer {
             discards_in_a_row: 0,
             early_in_a_row: 0,
             in_work: Shows::InBetween,
+            stride: 1,
+            has_news: false,
             slack: None,
             counts: PacerCounts::default(),
         }
@@ -141,6 +158,7 @@ impl Pacer {
             self.last_content = None;
         }
         self.newest = Some(content_time);
+        self.has_news = true;
         self.debug_verify();
     }
 
@@ -184,6 +202,11 @@ impl Pacer {
     /// earlier one that shows a key as it is, which takes less.
     fn next_picture(&self, from: MonoTime) -> (Shows, MonoTime) {
         let mut present_at = self.first_reachable(from);
+        if let Some(last) = self.last_target.filter(|_| !self.has_news && self.variable.is_none()) {
+            let passed_over = self.interval().scale(i64::from(self.stride) - 1, 1);
+            let half = self.interval().scale(1, 2);
+            present_at = present_at.max(self.refresh.at_or_after(last + half + passed_over));
+        }
         let of_key = self.first_reachable_with(from, self.budget_of(Shows::Key));
         if of_key <= present_at && self.shows_key(self.content_time_at(of_key)) {
             return (Shows::Key, of_key);
@@ -206,6 +229,7 @@ impl Pacer {
         }
         self.last_target = Some(plan.present_at);
         self.last_shown = None;
+        self.has_news = false;
         if let Some(variable) = &mut self.variable {
             variable.on_start(plan.present_at);
         }

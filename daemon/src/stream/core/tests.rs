@@ -39,6 +39,10 @@ struct Rig {
 
 impl Rig {
     fn new(method: Method) -> Self {
+        Self::with_least_step(method, 0.0)
+    }
+
+    fn with_least_step(method: Method, least_step_px: f32) -> Self {
         let format = StreamFormat {
             motion: Some(MotionConvention {
                 format: MotionFormat::Rg32f,
@@ -53,6 +57,7 @@ impl Rig {
             engine: EngineConfig { timer: tick, ..EngineConfig::new(method, NonZeroUsize::MIN) },
             refresh_interval: INTERVAL,
             display_origin: MonoTime::ZERO,
+            least_step_px,
         };
         Self { core: StreamCore::new(format, &config), now: MonoTime::ZERO, next_key: 0 }
     }
@@ -163,6 +168,32 @@ fn each_refresh_is_in_exactly_one_count_whatever_happens() {
     let counts = rig.core.counts();
     assert!(counts.dropped >= 2, "{counts:?}");
     assert!(counts.repeated > 30 && counts.real > 0 && counts.synthesised > 0, "{counts:?}");
+}
+
+#[test]
+fn in_betweens_are_left_out_until_something_has_moved_far_enough_and_keys_never_are() {
+    // 0.75 pixels a refresh, 4 refreshes a key.
+    let made = |least_step_px| {
+        let mut rig = Rig::with_least_step(Method::Linear, least_step_px);
+        rig.play(4);
+        let before = rig.core.counts();
+        let mut keys = Vec::new();
+        for key in 4..24 {
+            keys.extend(rig.make_until(at_ms(1_000 + 40 * key)).into_iter().filter_map(
+                |outcome| {
+                    let FrameOutcome::Presented(frame) = outcome else { return None };
+                    Some(frame.key_index)
+                },
+            ));
+            rig.key(1_000 + 40 * key);
+        }
+        keys.dedup();
+        assert!(keys.len() >= 20, "{least_step_px}: {keys:?}");
+        let after = rig.core.counts();
+        assert_eq!(after.dropped, before.dropped, "{least_step_px}");
+        after.real + after.synthesised - before.real - before.synthesised
+    };
+    assert_eq!([0.0, 0.75, 1.4, 100.0].map(made), [80, 80, 40, 20]);
 }
 
 #[test]

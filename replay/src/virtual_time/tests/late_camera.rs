@@ -29,6 +29,7 @@ fn shown(late_cameras: Vec<TimedPose>, threads: usize) -> Vec<(OutputFrame, Stri
         display_origin: None,
         pixels_per_degree: None,
         finish: FinishConfig::default(),
+        least_step_px: 0.0,
         late_cameras,
     };
     let keys = timed_keys(&mut recording, &reader, &plan, KeyTiming::AsRecorded).map(|key| {

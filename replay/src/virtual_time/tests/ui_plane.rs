@@ -32,6 +32,7 @@ fn shown(uis: Vec<TimedUi>, threads: usize) -> (Vec<(OutputFrame, [u8; 4])>, Str
         pixels_per_degree: None,
         late_cameras: Vec::new(),
         finish: FinishConfig::default(),
+        least_step_px: 0.0,
     };
     let keys = timed_keys(&mut recording, &reader, &plan, KeyTiming::AsRecorded);
     let (mut digester, mut frames) = (FrameDigester::default(), Vec::new());

@@ -31,6 +31,8 @@ enum Op {
     Mode { hz: u16 },
     /// The window is covered, or seen again.
     Visible(bool),
+    /// Pictures for so many refreshes are made from one to the next.
+    Stride(u8),
     /// Whether the pacer is told of what is handed over.
     Watch(bool),
     /// Time passes and nobody plans, as in a process that was stopped.
@@ -72,6 +74,7 @@ fn op() -> impl Strategy<Value = Op> {
         1 => (48_u16..240).prop_map(|hz| Op::Mode { hz }),
         1 => any::<bool>().prop_map(Op::Visible),
         1 => any::<bool>().prop_map(Op::Watch),
+        1 => (1_u8..5).prop_map(Op::Stride),
         1 => (1_u16..300).prop_map(|ms| Op::Sleep { ms }),
     ]
 }
@@ -82,6 +85,7 @@ struct World {
     kind: RefreshKind,
     is_visible: bool,
     is_watched: bool,
+    stride: u8,
     now: MonoTime,
     refresh: MonoSpan,
     key_interval: MonoSpan,
@@ -115,6 +119,7 @@ impl World {
             kind,
             is_visible: true,
             is_watched: false,
+            stride: 1,
             now: MonoTime::from_ns(5_000_000_000),
             refresh,
             key_interval: MonoSpan::from_hz(key_hz),
@@ -154,6 +159,10 @@ impl World {
                 self.pacer.on_visibility(is_visible);
             }
             Op::Watch(is_watched) => self.is_watched = is_watched,
+            Op::Stride(refreshes) => {
+                self.stride = refreshes;
+                self.pacer.set_stride(refreshes.into());
+            }
             Op::Sleep { ms } => {
                 self.now += MonoSpan::from_ms(ms.into());
                 self.next_key = self.now;
@@ -280,7 +289,8 @@ impl World {
         // A display that answers nothing, or nobody sees, is given less; on a variable one there is
         // nothing to show at every instant, but a key goes out at once.
         let is_slowed = status.unanswered > 1 || status.feedback == FeedbackState::Hidden;
-        let waits = self.kind == RefreshKind::Variable && !self.key_since_start;
+        let has_stride = self.stride > 1 || self.kind == RefreshKind::Variable;
+        let waits = has_stride && !self.key_since_start;
         if !is_slowed && !waits {
             prop_assert!(plan.present_at <= latest, "a refresh was passed over: {:?}", plan);
         }
