@@ -2,7 +2,7 @@
 
 use rayon::ThreadPool;
 
-use super::{Lead, MIXED, PerRung, RUNGS, Sample, index_of};
+use super::{Lead, MIXED, PerRung, RUNGS, Sample, index_of, unproven};
 use crate::bands::for_each_row;
 use crate::plane::Plane;
 use crate::trajectory::camera_path::CameraOrder;
@@ -64,7 +64,7 @@ pub(super) fn choose(
                 }
                 let whole = |count: f32| Preferred { rung: image, slack: Some(DOUBT / count) };
                 let Some(Score { score, count, share }) = score(samples, column, row) else {
-                    *lead = Lead::by(image);
+                    *lead = Lead::by(unproven(image));
                     continue;
                 };
                 lead.share = share;

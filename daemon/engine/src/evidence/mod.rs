@@ -87,6 +87,12 @@ pub const fn index_of(rung: Rung) -> usize {
     }
 }
 
+/// The rung of a surface that nothing was measured of, where the image takes `image`. Rungs below
+/// [`Rung::Linear`] ignore what the newest key says of its motion, and have to be proven.
+fn unproven(image: Rung) -> Rung {
+    if index_of(image) < index_of(Rung::Linear) { Rung::Linear } else { image }
+}
+
 /// What leads a surface on from the newest key.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Lead {
@@ -317,7 +323,8 @@ impl Evidence {
     }
 
     /// What leads a cell of depth key `depth` of the newest key on: that of the sample of its surface
-    /// which is nearest to it among its own and those around, else the image's.
+    /// which is nearest to it among its own and those around, else [`unproven`] of the image's: a thing
+    /// so thin that no sample lies on it goes by what the key says of it.
     #[must_use]
     #[inline(always)]
     pub fn lead_at(&self, x: u32, y: u32, depth: u32) -> Lead {
@@ -335,7 +342,12 @@ impl Evidence {
             columns.map(move |column| (column, row))
         });
         let found = around.find(|(column, row)| is_its(*column, *row));
-        found.map_or(Lead::by(self.image_rung), |(column, row)| self.leads.at(column, row))
+        let trusted = || self.trust.of(column, row) && !self.trust.is_cut();
+        match found {
+            Some((column, row)) => self.leads.at(column, row),
+            None if trusted() => Lead::by(unproven(self.image_rung)),
+            None => Lead::by(Rung::Hold),
+        }
     }
 
     /// Chooses the camera's order from the still samples that have just been measured.

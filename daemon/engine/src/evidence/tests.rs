@@ -103,6 +103,20 @@ fn where_nothing_moves_everything_is_held_and_nothing_accelerates() {
 }
 
 #[test]
+fn what_is_too_thin_for_a_sample_goes_by_its_own_motion_before_a_wall_that_is_held() {
+    // Samples lie in columns 2, 6, 10, ..; the bar in 1, 9, 17, ..
+    let bar = |index: i64| 1 + 8 * index.unsigned_abs() as u32;
+    let keys = (0..6).map(|index| {
+        let was = move |x, y: u32| [x as f32 - if x == bar(index) { 8.0 } else { 0.0 }, y as f32];
+        key(index, move |x, _| if x == bar(index) { NEAR } else { FAR }, was)
+    });
+    let (ladder, last) = climbed(Method::Auto, keys);
+    assert_eq!(ladder.evidence().rung_of_all(), Some(Rung::Hold), "no sample has seen it");
+    assert_eq!(last.velocity.at(bar(5), 40).x, 8 * 32);
+    assert_eq!(last.velocity.at(bar(5) + 3, 40), Default::default());
+}
+
+#[test]
 fn without_a_key_before_that_the_motion_leads_to_nothing_is_known() {
     let first = || key(0, |_, _| FAR, |x, y| [x as f32 - 3.0, y as f32]);
     let cut = KeyFrame { is_cut: true, ..key(1, |_, _| FAR, |x, y| [x as f32 - 3.0, y as f32]) };

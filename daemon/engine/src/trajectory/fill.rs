@@ -18,6 +18,9 @@ const WORLD_CELLS: usize = 8;
 /// Cells between the same lattice points.
 const LATTICE_CELLS: usize = STRIDE as usize;
 
+/// Motion that does not round to zero, pixels.
+const LEAST_PX: f32 = 0.5 / Velocity::PER_PX as f32;
+
 /// What the trajectories of one key are made from.
 #[derive(Debug)]
 pub(super) struct Filling<'a> {
@@ -108,6 +111,13 @@ impl Filling<'_> {
             _ => {}
         }
         self.each(rung, &mut run, done..cells);
+    }
+
+    /// Whether the key says that nothing moves in `run`.
+    #[inline(always)]
+    pub(super) fn is_still(&self, run: &Run<'_>) -> bool {
+        let row = &self.key.displacement.row(run.y)[run.x as usize..][..run.velocity.len()];
+        row.iter().all(|[dx, dy]| dx.abs().max(dy.abs()) < LEAST_PX)
     }
 
     /// Takes cells on one by one.

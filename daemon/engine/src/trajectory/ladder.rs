@@ -394,8 +394,13 @@ impl Ladder {
             Choice::Evidence if self.models.late.is_some() => None,
             Choice::Evidence => self.evidence.rung_of_all(),
         };
+        let is_always = !matches!(self.choice, Choice::Evidence);
         let is_decoded = key.velocity.data().len() == key.displacement.data().len();
-        if one_for_all == Some(Rung::Linear) && is_decoded {
+        let is_still = || key.velocity.data().iter().all(|v| *v == Velocity::default());
+        // Held, or gone by a motion of zero: the same.
+        let is_own = one_for_all == Some(Rung::Linear)
+            || (one_for_all == Some(Rung::Hold) && is_decoded && is_still());
+        if is_own && is_decoded {
             // The field as it was decoded.
             key.acceleration.resize(0, 0);
             return;
@@ -416,8 +421,8 @@ impl Ladder {
             |y, velocity, acceleration| {
                 let run = Run { x: 0, y, velocity, acceleration };
                 match one_for_all {
-                    Some(rung) => filling.by(rung, run),
-                    None => fill_row(&filling, evidence, run),
+                    Some(rung) if is_always || rung != Rung::Hold => filling.by(rung, run),
+                    _ => fill_row(&filling, evidence, run),
                 }
                 if acceleration.iter().any(|a| *a != Acceleration::default()) {
                     accelerates.store(true, Ordering::Relaxed);
@@ -465,6 +470,8 @@ fn fill_row(filling: &Filling<'_>, evidence: &Evidence, mut row: Run<'_>) {
         let end = (column * STRIDE).min(width);
         let run = row.take((end - first * STRIDE) as usize);
         match rung {
+            // What moves among samples that are held is too thin for one of its own.
+            Some(Rung::Hold) if !filling.is_still(&run) => fill_mixed(filling, evidence, run),
             Some(rung) => filling.by(rung, run),
             None => fill_mixed(filling, evidence, run),
         }

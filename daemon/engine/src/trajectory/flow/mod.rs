@@ -57,6 +57,8 @@ pub struct Flow {
     older: Pyramid,
     /// Content time of the key that `newest` is of.
     newest_of: Option<MonoTime>,
+    /// The same of `older`.
+    older_of: Option<MonoTime>,
     search: Search,
     cells: Cells,
     failing: Failing,
@@ -114,15 +116,19 @@ impl Flow {
             && is_in(older);
         let is_large = newest.valid.width.min(newest.valid.height) >= 2 * BLOCK;
         if !is_alike || !is_large {
-            self.newest_of = None;
+            (self.newest_of, self.older_of) = (None, None);
             return false;
         }
+        let (of_newest, of_older) = (Some(newest.content_time), Some(older.content_time));
+        if (self.newest_of, self.older_of) == (of_newest, of_older) {
+            return true;
+        }
         std::mem::swap(&mut self.newest, &mut self.older);
-        if self.newest_of != Some(older.content_time) {
+        if self.newest_of != of_older {
             self.older.update(pool, older);
         }
         self.newest.update(pool, newest);
-        self.newest_of = Some(newest.content_time);
+        (self.newest_of, self.older_of) = (of_newest, of_older);
         true
     }
 
