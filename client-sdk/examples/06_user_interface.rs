@@ -1,8 +1,8 @@
-//! A user interface at a rate of its own: 30 key frames a second, and a clock hand that moves 120 times
-//! a second over whatever the daemon makes of them.
+//! A user interface at a rate of its own: 30 key frames a second, and a clock hand that moves 120
+//! times a second over whatever the daemon makes of them.
 //!
-//! Key frames hold the scene without the interface. The interface is never warped: it stays where it
-//! is placed, to the pixel.
+//! Key frames hold the scene without the interface. The interface is never warped: it stays where
+//! it is placed, to the pixel.
 
 mod clock;
 

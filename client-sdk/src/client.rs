@@ -235,7 +235,8 @@ impl Client {
     }
 
     /// A free slot for a user interface between key frames, of a stream that declares UI planes, at
-    /// its largest size. The last free slot is left to key frames, so such a stream wants a slot more.
+    /// its largest size. The last free slot is left to key frames, so such a stream wants a slot
+    /// more.
     ///
     /// # Errors
     /// [`Error::WouldBlock`] if none is free, [`Error::NoPlane`] if the stream has no UI planes.
@@ -251,8 +252,8 @@ impl Client {
     /// Shows a user interface from the next picture on, in the place of the one before.
     ///
     /// # Errors
-    /// [`Error::WouldBlock`] if the daemon has not read for a while: it is left out, and the slot is
-    /// free again. Other errors if it contradicts its stream; nothing is sent then.
+    /// [`Error::WouldBlock`] if the daemon has not read for a while: it is left out, and the slot
+    /// is free again. Other errors if it contradicts its stream; nothing is sent then.
     pub fn submit_ui(&mut self, ui: UiFrame) -> Result<()> {
         self.connected()?;
         let (mut frame, plane, place) = ui.into_parts()?;

@@ -147,8 +147,8 @@ impl StreamOptions {
     }
 
     /// Adds premultiplied user-interface planes of up to this size, with the format of colour: with
-    /// key frames, or by themselves ([`Client::acquire_ui`](crate::Client::acquire_ui)), for which a
-    /// slot more is good.
+    /// key frames, or by themselves ([`Client::acquire_ui`](crate::Client::acquire_ui)), for which
+    /// a slot more is good.
     pub fn ui(mut self, format: ColorFormat, width: u32, height: u32) -> Self {
         self.format.ui = Some(format);
         self.ui_size = PlaneSize { width, height };

@@ -1,7 +1,8 @@
 //! A user interface in the application's hands, between key frames.
 //!
-//! It lies in a slot like a key frame, and only its UI plane is used. It is shown over every picture
-//! from the next one on, where it is placed, neither moved nor scaled, until another one comes.
+//! It lies in a slot like a key frame, and only its UI plane is used. It is shown over every
+//! picture from the next one on, where it is placed, neither moved nor scaled, until another one
+//! comes.
 
 use foreframe_protocol::{PlaneDescriptor, PlaneKind, PlaneSize, Rect};
 
@@ -27,8 +28,8 @@ impl UiFrame {
         self.frame.plane(PlaneKind::Ui)
     }
 
-    /// The pixels to write: premultiplied, in the format of the stream's colour. What they held before
-    /// is whatever the slot was used for, so write every one, transparent ones too.
+    /// The pixels to write: premultiplied, in the format of the stream's colour. What they held
+    /// before is whatever the slot was used for, so write every one, transparent ones too.
     pub fn pixels_mut(&mut self) -> PlaneMut<'_> {
         self.frame.plane_mut(PlaneKind::Ui).unwrap_or(PlaneMut {
             bytes: &mut [],
@@ -39,8 +40,8 @@ impl UiFrame {
         })
     }
 
-    /// Gives the plane another size, up to what the stream declares: what is small costs little. Its
-    /// rows are packed anew, and all of it is valid.
+    /// Gives the plane another size, up to what the stream declares: what is small costs little.
+    /// Its rows are packed anew, and all of it is valid.
     ///
     /// # Errors
     /// [`Error::Plane`] if it is larger than declared.
@@ -56,8 +57,8 @@ impl UiFrame {
         self.frame.set_valid(PlaneKind::Ui, valid)
     }
 
-    /// Column and row of the output that the plane's first pixel lies on, (0, 0) unless stated. What
-    /// lies outside the output is not shown.
+    /// Column and row of the output that the plane's first pixel lies on, (0, 0) unless stated.
+    /// What lies outside the output is not shown.
     pub fn set_place(&mut self, x: i32, y: i32) {
         self.place = [x, y];
     }

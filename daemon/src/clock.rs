@@ -26,8 +26,8 @@ pub fn now() -> MonoTime {
     MonoTime::from_ns(time.tv_sec.unsigned_abs() * NS_PER_S + time.tv_nsec.unsigned_abs())
 }
 
-/// The instant at which the clock of the kernel with number `id` showed `time_ns`, by both clocks as
-/// they are now; None for clocks that a presentation time is never told in.
+/// The instant at which the clock of the kernel with number `id` showed `time_ns`, by both clocks
+/// as they are now; None for clocks that a presentation time is never told in.
 #[must_use]
 pub fn from_other_clock(id: u32, time_ns: u64) -> Option<MonoTime> {
     let other = match id {

@@ -28,8 +28,8 @@ pub struct Args {
     /// Socket to listen on [default: foreframe/daemon.sock in XDG_RUNTIME_DIR]
     #[arg(long, value_name = "PATH")]
     pub socket: Option<PathBuf>,
-    /// Where output frames go: window, null, shm, png:DIR, y4m:PATH, or - for y4m on standard output
-    /// [default: shm]
+    /// Where output frames go: window, null, shm, png:DIR, y4m:PATH, or - for y4m on standard
+    /// output [default: shm]
     #[arg(long)]
     pub sink: Option<SinkSpec>,
     /// Windows are as large as the monitor
@@ -42,8 +42,8 @@ pub struct Args {
     /// Refresh rate of the output, 1 to 1000; a window has its display's [default: 120]
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub refresh: Option<f64>,
-    /// What makes the pictures: auto, cpu, gpu or gpu:NAME; `foreframe adapters` says what auto takes
-    /// [default: auto]
+    /// What makes the pictures: auto, cpu, gpu or gpu:NAME; `foreframe adapters` says what auto
+    /// takes [default: auto]
     #[arg(long)]
     #[serde(default, deserialize_with = "from_name")]
     pub backend: Option<BackendChoice>,
@@ -56,12 +56,12 @@ pub struct Args {
     /// [default: every refresh]
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub cap: Option<f64>,
-    /// Leave out in-between frames until something has moved by so many pixels, 0 to 16: fewer frames
-    /// where little moves [default: 0, none are left out]
+    /// Leave out in-between frames until something has moved by so many pixels, 0 to 16: fewer
+    /// frames where little moves [default: 0, none are left out]
     #[arg(long, value_name = "PX", allow_negative_numbers = true)]
     pub least_step: Option<f32>,
-    /// What to draw into the pictures of windows: off, stats, motion, grid, rungs, disocclusion, tear,
-    /// only-real or only-synthesised; `h` in a window goes through them [default: off]
+    /// What to draw into the pictures of windows: off, stats, motion, grid, rungs, disocclusion,
+    /// tear, only-real or only-synthesised; `h` in a window goes through them [default: off]
     #[arg(long, value_name = "VIEW")]
     #[serde(default, deserialize_with = "from_name")]
     pub hud: Option<HudView>,
@@ -75,13 +75,14 @@ pub struct Args {
     /// follow
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub ppd: Option<f32>,
-    /// Blur in in-between frames, made up for in their keys: off, on, or auto, as far as no flicker is
-    /// seen [default: off]
+    /// Blur in in-between frames, made up for in their keys: off, on, or auto, as far as no flicker
+    /// is seen [default: off]
     #[arg(long)]
     #[serde(default, deserialize_with = "from_name")]
     pub finish: Option<FinishMode>,
-    /// Display that shows the output: a built-in profile (`foreframe perception displays`) or a file
-    /// that ends in .toml. Where there is no --ppd it gives that too, from 65 cm before a screen
+    /// Display that shows the output: a built-in profile (`foreframe perception displays`) or a
+    /// file that ends in .toml. Where there is no --ppd it gives that too, from 65 cm before a
+    /// screen
     #[arg(long, value_name = "NAME")]
     pub profile: Option<String>,
     /// What to log on standard error: error, warn, info, debug, trace, or a filter such as

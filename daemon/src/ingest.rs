@@ -218,8 +218,8 @@ pub fn key_input<'a>(
     })
 }
 
-/// The user interface that came with a key frame, as the engine takes it; None if none did. `source`
-/// gives the pixels of a plane.
+/// The user interface that came with a key frame, as the engine takes it; None if none did.
+/// `source` gives the pixels of a plane.
 ///
 /// # Errors
 /// As [`key_input`].

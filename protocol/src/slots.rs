@@ -7,8 +7,8 @@
 //! ```
 //!
 //! At most one slot of a stream is submitted, and at most one is latched, whenever a call returns:
-//! a newer key frame takes the place of one that was not latched yet. So it is with UI planes, which
-//! lie in slots of the same pool and are counted apart ([`Holds`]).
+//! a newer key frame takes the place of one that was not latched yet. So it is with UI planes,
+//! which lie in slots of the same pool and are counted apart ([`Holds`]).
 
 use crate::error::{Error, Result};
 use crate::limits::MAX_SLOTS;

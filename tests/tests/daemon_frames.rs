@@ -360,7 +360,8 @@ fn a_user_interface_changes_without_a_key_and_lies_over_the_next_one_too() {
     assert!(replayed(&daemon.path("a.mcap"), false) != seen, "and not without what came between");
 }
 
-/// What a replay of the capture shows, without repetitions; with the user interfaces between keys or not.
+/// What a replay of the capture shows, without repetitions; with the user interfaces between keys
+/// or not.
 fn replayed(path: &Path, with_ui: bool) -> Vec<Vec<u8>> {
     let mut recording = CaptureRecording::open(path).unwrap();
     let one = std::num::NonZeroUsize::MIN;

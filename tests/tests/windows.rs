@@ -1,5 +1,5 @@
-//! Windows of the daemon on real compositors: frames are shown, their feedback paces the stream, and
-//! what a display lacks is named. None of these tests knows how fast anything has to be.
+//! Windows of the daemon on real compositors: frames are shown, their feedback paces the stream,
+//! and what a display lacks is named. None of these tests knows how fast anything has to be.
 
 mod compositors;
 mod daemon_fixture;

@@ -1,7 +1,8 @@
 // What every shader shares: the parameters of a frame, and the integer arithmetic of
 // `params.rs`, `key.rs`, `warp/mod.rs`, `field.rs` in the same words.
 //
-// Shaders use integers alone. An `i32` shifted right rounds towards minus infinity, here as in Rust.
+// Shaders use integers alone. An `i32` shifted right rounds towards minus infinity, here as in
+// Rust.
 
 struct FrameParams {
     size: vec2<u32>,

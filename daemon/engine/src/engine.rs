@@ -39,7 +39,8 @@ pub struct EngineConfig {
     pub pixels_per_degree: Option<f32>,
     /// Whether detail moves from in-between frames to their keys. On its own it is off.
     pub finish: FinishConfig,
-    /// How many keys that move are looked at, from the first on, for what is wrong with their motion.
+    /// How many keys that move are looked at, from the first on, for what is wrong with their
+    /// motion.
     pub keys_to_check: u32,
     /// Which ways through the kernels are taken. The result does not depend on it.
     pub simd: Simd,
@@ -50,8 +51,8 @@ pub struct EngineConfig {
 }
 
 impl EngineConfig {
-    /// Makes frames by `method` on `threads`: undamped, not finished, unchecked, by the widest registers,
-    /// without asking for priority, and with a timer that stands still.
+    /// Makes frames by `method` on `threads`: undamped, not finished, unchecked, by the widest
+    /// registers, without asking for priority, and with a timer that stands still.
     #[must_use]
     pub fn new(method: Method, threads: NonZeroUsize) -> Self {
         Self {
@@ -306,8 +307,8 @@ impl Engine {
         })
     }
 
-    /// Estimates the motion of `key`, which has none, from its picture and the newest one's. Returns
-    /// whether that was wanted and possible.
+    /// Estimates the motion of `key`, which has none, from its picture and the newest one's.
+    /// Returns whether that was wanted and possible.
     fn estimate_motion(&mut self, key: &mut KeyFrame) -> bool {
         let wanted = self.newest.as_ref().filter(|_| self.config.method.follows_motion());
         let Some(older) = wanted else { return false };

@@ -42,8 +42,8 @@ impl Inspection<'_> {
         velocity.is_trackable().then(|| [pixels(velocity.x), pixels(velocity.y)])
     }
 
-    /// How fast the picture moves, pixels per second: the median speed of what moves, or 0 where nearly
-    /// nothing does. None without motion.
+    /// How fast the picture moves, pixels per second: the median speed of what moves, or 0 where
+    /// nearly nothing does. None without motion.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "seconds need no more than an f32")]
     pub fn speed(&self) -> Option<f32> {
@@ -107,8 +107,8 @@ impl Inspection<'_> {
         counts.into_iter().map(|(name, count)| (name, percent(count))).collect()
     }
 
-    /// Blocks of `block` pixels that no block of the key lands on at `phase`: what has come into sight,
-    /// and is filled.
+    /// Blocks of `block` pixels that no block of the key lands on at `phase`: what has come into
+    /// sight, and is filled.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "sizes up to 8192 are exact")]
     pub fn uncovered(&self, phase: f64, block: u32) -> Plane<bool> {
@@ -146,8 +146,8 @@ impl Inspection<'_> {
         uncovered
     }
 
-    /// The speed that one surface in a hundred exceeds, pixels per motion span. 0 where nothing is known
-    /// to move.
+    /// The speed that one surface in a hundred exceeds, pixels per motion span. 0 where nothing is
+    /// known to move.
     #[must_use]
     pub fn fast_px(&self) -> f32 {
         let field = &self.key.velocity;

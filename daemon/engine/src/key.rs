@@ -173,8 +173,8 @@ pub struct KeyFrame {
     pub inverse_distance_per_depth_key: Option<f32>,
     /// Dilated, quantised motion per cell of the field grid. Empty without a motion plane.
     pub velocity: Plane<Velocity>,
-    /// `velocity` as it was decoded, where a method has put other trajectories in its place: how far
-    /// surfaces came since `motion_from`. Empty where `velocity` is still that.
+    /// `velocity` as it was decoded, where a method has put other trajectories in its place: how
+    /// far surfaces came since `motion_from`. Empty where `velocity` is still that.
     pub came: Plane<Velocity>,
     /// Acceleration that goes with `velocity`. Empty where nothing accelerates.
     pub acceleration: Plane<Acceleration>,

@@ -13,8 +13,8 @@ pub(crate) const LANES: usize = 8;
 #[repr(align(32))]
 pub(crate) struct Lanes(pub(crate) [f32; LANES]);
 
-/// What `part` gives for either axis. Unlike `map` of an array it is a part of its caller, which may
-/// be compiled for wider registers.
+/// What `part` gives for either axis. Unlike `map` of an array it is a part of its caller, which
+/// may be compiled for wider registers.
 #[inline(always)]
 pub(crate) fn both<T>(part: impl Fn(usize) -> T) -> [T; 2] {
     [part(0), part(1)]

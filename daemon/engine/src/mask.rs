@@ -3,9 +3,9 @@
 //!
 //! Depth and motion are those of one surface per pixel. A shadow, a reflection or a texture that
 //! scrolls moves otherwise than the surface that shows it; smoke and glass are a second layer; and
-//! some passes write no vector at all. The class says whose motion a cell takes ([`Source`]), before
-//! any rung sees the field: so it holds for every method that follows motion, and evidence judges what
-//! comes of it like any other motion.
+//! some passes write no vector at all. The class says whose motion a cell takes ([`Source`]),
+//! before any rung sees the field: so it holds for every method that follows motion, and evidence
+//! judges what comes of it like any other motion.
 //!
 //! Exactness: `f32` that is copied, never computed, but for the scale of the flow.
 
@@ -61,9 +61,9 @@ impl MaskClass {
         }
     }
 
-    /// Whose motion its cells take, by what `foreframe stability` shows (the sweeps with a mask beside
-    /// those without): the picture gains on shadows, reflections, animated textures and panes of
-    /// glass, up to 12 dB. Sparks are smaller than what its motion can be found of.
+    /// Whose motion its cells take, by what `foreframe stability` shows (the sweeps with a mask
+    /// beside those without): the picture gains on shadows, reflections, animated textures and
+    /// panes of glass, up to 12 dB. Sparks are smaller than what its motion can be found of.
     #[must_use]
     #[inline(always)]
     pub const fn source(self) -> Source {
@@ -80,8 +80,9 @@ impl MaskClass {
 /// Cells that are looked at on each side for a neighbour of the same surface.
 const REACH: u32 = 8;
 
-/// Gives cells without a motion of their own that of the nearest cell of their surface that has one, along
-/// their row and column; the others NaN. Without depth nothing says whose surface a cell is of.
+/// Gives cells without a motion of their own that of the nearest cell of their surface that has
+/// one, along their row and column; the others NaN. Without depth nothing says whose surface a cell
+/// is of.
 pub(crate) fn fill_invalid(
     pool: &ThreadPool,
     mask: &Plane<u8>,
@@ -129,8 +130,8 @@ pub(crate) fn asks_for_picture(mask: &Plane<u8>, displacement: &Plane<[f32; 2]>)
     mask.data().iter().zip(displacement.data()).any(|(code, d)| goes_by_picture(*code, *d))
 }
 
-/// Gives the cells that go by the picture the motion that `flow`, of the same cells, has found there,
-/// times `scale`.
+/// Gives the cells that go by the picture the motion that `flow`, of the same cells, has found
+/// there, times `scale`.
 pub(crate) fn take_picture(
     mask: &Plane<u8>,
     flow: &Plane<[f32; 2]>,

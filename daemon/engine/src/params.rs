@@ -1,7 +1,7 @@
 //! The parameters that every kernel's shader shares, and how the field map goes to it.
 //!
-//! A parameter is computed here once, with the functions that the CPU's kernels use, so that the two
-//! cannot differ in it. `common.wgsl` declares the same struct; a test compares the offsets.
+//! A parameter is computed here once, with the functions that the CPU's kernels use, so that the
+//! two cannot differ in it. `common.wgsl` declares the same struct; a test compares the offsets.
 
 use zerocopy::{Immutable, IntoBytes};
 

@@ -122,7 +122,8 @@ impl Plane {
         self.values.iter().copied().fold(f32::NEG_INFINITY, f32::max)
     }
 
-    /// Convolved along rows and columns with `kernel` of odd length, its taps `spread` pixels apart.
+    /// Convolved along rows and columns with `kernel` of odd length, its taps `spread` pixels
+    /// apart.
     #[must_use]
     pub fn convolved(&self, kernel: &[f32], spread: usize) -> Self {
         self.convolved_along(kernel, spread, [1, 0]).convolved_along(kernel, spread, [0, 1])

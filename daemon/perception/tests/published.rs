@@ -1,7 +1,7 @@
 //! The numbers in `docs/perception.md` are what the models give.
 //!
-//! Each test computes the rows of one table and looks for them in the document, word for word. Where
-//! a model changes, the message has the rows that the document must have.
+//! Each test computes the rows of one table and looks for them in the document, word for word.
+//! Where a model changes, the message has the rows that the document must have.
 
 use foreframe_perception::banding::{BandWidth, Gradient};
 use foreframe_perception::detection::any;

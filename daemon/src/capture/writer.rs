@@ -137,8 +137,8 @@ impl<W: Write> CaptureWriter<W> {
     /// that they take in the file.
     ///
     /// # Errors
-    /// If its stream was not added, the plane does not fit the stream's format, or the file cannot be
-    /// written.
+    /// If its stream was not added, the plane does not fit the stream's format, or the file cannot
+    /// be written.
     pub fn ui_plane(
         &mut self,
         arrived_at_ns: u64,

@@ -1,5 +1,5 @@
-//! Drawing for the HUD and for the pictures of the tool: a canvas over tiny-skia, text over ab_glyph, and drawings
-//! that become pixels or SVG.
+//! Drawing for the HUD and for the pictures of the tool: a canvas over tiny-skia, text over
+//! ab_glyph, and drawings that become pixels or SVG.
 //!
 //! Software only and with a built-in font, so that a picture has the same pixels on every machine.
 //! Positions are pixels from the top left corner; nothing outside the canvas is drawn, and nothing

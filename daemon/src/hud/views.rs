@@ -17,8 +17,8 @@ const FULL_SPEED: f32 = 32.0;
 /// How much of a view covers the picture, of 256.
 const OPACITY: u32 = 176;
 
-/// Direction of motion as hue, the root of speed as strength, so that slow motion shows too; grey where
-/// nothing is known.
+/// Direction of motion as hue, the root of speed as strength, so that slow motion shows too; grey
+/// where nothing is known.
 pub(super) fn motion(inspection: Inspection<'_>, picture: &mut ColorPlane) {
     blocks(picture, |x, y| match inspection.motion_at(x, y) {
         None => ColorU8::from_rgba(128, 128, 128, 255),

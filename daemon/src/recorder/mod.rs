@@ -29,8 +29,8 @@ use crate::stream::planes::KeyPlanes;
 
 /// Late cameras that wait for the next key; of more, the oldest are left out.
 const HELD_POSES: usize = 256;
-/// Keys and UI planes that may wait for the disk, over all streams. At 60 keys a second this rides out a stall of
-/// 130 ms; each costs one set of planes of memory.
+/// Keys and UI planes that may wait for the disk, over all streams. At 60 keys a second this rides
+/// out a stall of 130 ms; each costs one set of planes of memory.
 const QUEUED_KEYS: usize = 8;
 
 #[expect(clippy::large_enum_variant, reason = "nearly all are keys, and few wait")]
@@ -179,8 +179,8 @@ impl StreamRecorder {
         self.count_missing(arrived_at);
     }
 
-    /// Hands over a UI plane that is shown from now on, or counts it as missing if the disk is behind.
-    /// Never waits.
+    /// Hands over a UI plane that is shown from now on, or counts it as missing if the disk is
+    /// behind. Never waits.
     pub fn offer_ui(&mut self, ui: &UiPlane, arrived_at: MonoTime, planes: &Arc<KeyPlanes>) {
         let ui = UiPlane { stream: self.number, ..*ui };
         let job = Job::Ui { arrived_at, ui, planes: Arc::clone(planes) };

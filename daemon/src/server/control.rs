@@ -198,8 +198,8 @@ impl Server {
         self.recorder.as_ref().and(self.config.record.as_deref())
     }
 
-    /// Takes over what can change while streams run, and names what cannot. A recording is left as it
-    /// is: to go back to a file that was written before would overwrite it.
+    /// Takes over what can change while streams run, and names what cannot. A recording is left as
+    /// it is: to go back to a file that was written before would overwrite it.
     pub(super) fn reload(&mut self) -> Result<Vec<String>, String> {
         let Some(told) = self.told.clone() else {
             return Err(

@@ -74,8 +74,8 @@ impl Stream {
 }
 
 /// Bytes of private memory that a stream may take: eight pictures (two keys, a copy, the one being
-/// made, four on the way to a sink), 48 bytes a pixel of depth, motion and what the warp needs, and a
-/// user interface and a mask.
+/// made, four on the way to a sink), 48 bytes a pixel of depth, motion and what the warp needs, and
+/// a user interface and a mask.
 pub(super) fn stream_cost(create: &CreateStream) -> u64 {
     let bytes_per_pixel = u64::from(create.format.color.bytes_per_pixel());
     let area = |kind| {

@@ -3,8 +3,8 @@
 //! [`Sink`] takes frames in and does nothing else: no thread, no clock. Deterministic replay drives
 //! it directly. The daemon puts the slow ones behind a [`worker`] with a bounded queue, so that a
 //! slow disk costs frames in the file and never a frame on the display. Subscribers are served by
-//! the stream itself: a frame for them is a copy into shared memory, not a write. A [`window`] is more
-//! than a sink: it says when it showed what, and the stream is paced by that.
+//! the stream itself: a frame for them is a copy into shared memory, not a write. A [`window`] is
+//! more than a sink: it says when it showed what, and the stream is paced by that.
 
 pub mod png;
 pub mod srgb;

@@ -121,8 +121,8 @@ const FIRST_DEADLINE_PERCENT: i64 = 55;
 /// What the first in-between frame is expected to take: at 1280x720 and on two processors, while
 /// nothing is in any cache.
 const FIRST_WORK: MonoSpan = MonoSpan::from_ms(6);
-/// A picture is made for one refresh in so many, however slowly things move: about the key interval of
-/// the slowest application on the fastest display.
+/// A picture is made for one refresh in so many, however slowly things move: about the key interval
+/// of the slowest application on the fastest display.
 const LONGEST_STRIDE: u32 = 8;
 /// Pictures under way at most; a display that answers nothing is not waited for.
 const UNDER_WAY: usize = 64;
@@ -130,7 +130,8 @@ const UNDER_WAY: usize = 64;
 /// What a display tells.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Told {
-    /// The picture planned for `planned` was shown at `presented_at`, which was heard at `heard_at`.
+    /// The picture planned for `planned` was shown at `presented_at`, which was heard at
+    /// `heard_at`.
     Presented {
         /// As planned.
         planned: MonoTime,
@@ -341,8 +342,8 @@ impl StreamCore {
         if needed >= LONGEST_STRIDE as f32 { LONGEST_STRIDE } else { (needed.ceil() as u32).max(1) }
     }
 
-    /// Shows a user interface over every picture from now on, unless one that came in later is shown
-    /// already.
+    /// Shows a user interface over every picture from now on, unless one that came in later is
+    /// shown already.
     ///
     /// # Errors
     /// If its numbers do not describe pixels that are there. The one before stays.

@@ -1,9 +1,9 @@
-//! What a stream would best render: the schedule of the motion-quality model for the pixels that its
-//! client renders per second, and the speed at which they move.
+//! What a stream would best render: the schedule of the motion-quality model for the pixels that
+//! its client renders per second, and the speed at which they move.
 //!
-//! Once per second of content time, and to the client only when it says something new. The display is
-//! taken to be lit all of the time, as most are, and what moves to be predictable. Needs the angular
-//! size of a pixel (`--ppd`, `--profile`): without it the model knows no speed.
+//! Once per second of content time, and to the client only when it says something new. The display
+//! is taken to be lit all of the time, as most are, and what moves to be predictable. Needs the
+//! angular size of a pixel (`--ppd`, `--profile`): without it the model knows no speed.
 
 use foreframe_engine::{MonoSpan, MonoTime};
 use foreframe_perception::motion_quality::Motion;
@@ -35,8 +35,8 @@ struct Window {
 }
 
 impl Hints {
-    /// For pictures of this size on a display with these refreshes; None where it is not known how large
-    /// they are to the eye, or the display is slower than any schedule.
+    /// For pictures of this size on a display with these refreshes; None where it is not known how
+    /// large they are to the eye, or the display is slower than any schedule.
     #[must_use]
     pub fn new(
         size_px: [u32; 2],
@@ -53,8 +53,9 @@ impl Hints {
         is_fast.then_some(Self { display, window: None, told: None })
     }
 
-    /// A key that shows `content_time` was rendered with so many `pixels`; `speed` says how fast its
-    /// picture moves, pixels per second. What to tell the client, without the number of its stream.
+    /// A key that shows `content_time` was rendered with so many `pixels`; `speed` says how fast
+    /// its picture moves, pixels per second. What to tell the client, without the number of its
+    /// stream.
     pub fn on_key(
         &mut self,
         content_time: MonoTime,

@@ -194,8 +194,8 @@ impl Mailbox {
         }
     }
 
-    /// Puts a late camera in; of two the newer content time stays. Nobody is woken: the next picture
-    /// looks, and a stream that has none planned waits for its next key.
+    /// Puts a late camera in; of two the newer content time stays. Nobody is woken: the next
+    /// picture looks, and a stream that has none planned waits for its next key.
     pub fn put_late_camera(&self, pose: LateCamera, arrived_at: MonoTime) {
         let mut state = self.lock();
         let is_newer =

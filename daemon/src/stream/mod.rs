@@ -29,9 +29,11 @@ use foreframe_protocol::{ErrorMessage, Hint, OutputFrame, Pacing, Presented, Sta
 pub enum StreamEvent {
     /// The planes of a key frame, or a UI plane, are copied.
     SlotCopied(SlotUse),
-    /// A key frame or UI plane does not fit its stream. The message has everything but the stream's number.
+    /// A key frame or UI plane does not fit its stream. The message has everything but the stream's
+    /// number.
     KeyRefused(ErrorMessage),
-    /// What its keys hold looks like something else than the stream declares. Lacks the stream's number.
+    /// What its keys hold looks like something else than the stream declares. Lacks the stream's
+    /// number.
     Noticed(ErrorMessage),
     /// A key frame came to the display. Lacks the stream's number.
     Presented(Presented),

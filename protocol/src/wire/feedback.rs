@@ -101,8 +101,8 @@ pub struct Statistics {
     pub keys_superseded: u64,
     /// Of these, with planes that do not fit the stream.
     pub keys_refused: u64,
-    /// Refreshes that showed what they should: real + synthesised + repeated. From the first planned
-    /// picture on, each refresh is in exactly one of these three or in `dropped`.
+    /// Refreshes that showed what they should: real + synthesised + repeated. From the first
+    /// planned picture on, each refresh is in exactly one of these three or in `dropped`.
     pub presented: u64,
     /// Of these, key frames as they came.
     pub real: u64,
@@ -165,7 +165,8 @@ wire_struct! {
     }
 }
 
-/// How well submissions meet the display, as of the newest. Durations only, so that no clock has to be shared.
+/// How well submissions meet the display, as of the newest. Durations only, so that no clock has to
+/// be shared.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Pacing {
     /// The client's number of the stream.
@@ -177,9 +178,9 @@ pub struct Pacing {
     /// How much later key frames could arrive without being shown later, smoothed; 0 to one refresh
     /// interval.
     pub slack_ns: i64,
-    /// How much later the application should start its frames to be shown soonest after they arrive;
-    /// negative: earlier. At most half a refresh interval. Following a sixteenth of it a frame is
-    /// stable.
+    /// How much later the application should start its frames to be shown soonest after they
+    /// arrive; negative: earlier. At most half a refresh interval. Following a sixteenth of it a
+    /// frame is stable.
     pub phase_error_ns: i64,
 }
 

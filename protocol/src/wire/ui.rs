@@ -42,8 +42,8 @@ pub struct UiPlane {
 }
 
 impl UiPlane {
-    /// Checks what needs the stream: that it has UI planes, and that this one fits what was declared
-    /// and the slot.
+    /// Checks what needs the stream: that it has UI planes, and that this one fits what was
+    /// declared and the slot.
     ///
     /// # Errors
     /// The first fault, with what was expected and found.

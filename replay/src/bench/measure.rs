@@ -1,4 +1,5 @@
-//! The loops that are timed, in turn: keys with their frames as a stream has them, and plain copies.
+//! The loops that are timed, in turn: keys with their frames as a stream has them, and plain
+//! copies.
 
 use foreframe_engine::{ColorPlane, Engine, EngineConfig, Method, MonoSpan, MonoTime};
 use foreframed::clock;

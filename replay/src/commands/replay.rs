@@ -48,16 +48,16 @@ pub struct Args {
     /// follow [default: as in the capture, which is without, unless it was recorded with `--ppd`]
     #[arg(long, value_name = "N", value_parser = number(1.0, 1000.0), allow_negative_numbers = true)]
     pub ppd: Option<f64>,
-    /// Blur in in-between frames, made up for in their keys: off, on, or auto, as far as no flicker is
-    /// seen.
+    /// Blur in in-between frames, made up for in their keys: off, on, or auto, as far as no flicker
+    /// is seen.
     #[arg(long, default_value_t = FinishMode::Off)]
     pub finish: FinishMode,
     /// Leave out in-between frames until something has moved by so many pixels, 0 to 16.
     #[arg(long, value_name = "PX", default_value_t = 0.0, value_parser = number(0.0, 16.0))]
     #[arg(allow_negative_numbers = true)]
     pub least_step: f64,
-    /// Display that the output is for: a built-in profile (see `perception displays`) or a file that
-    /// ends in .toml. Without --ppd it gives that too, from 65 cm before a screen.
+    /// Display that the output is for: a built-in profile (see `perception displays`) or a file
+    /// that ends in .toml. Without --ppd it gives that too, from 65 cm before a screen.
     #[arg(long, value_name = "NAME")]
     pub profile: Option<String>,
     /// Take every N-th frame as a key, from frame 0, and leave out the others.

@@ -42,20 +42,20 @@ pub struct Args {
     /// Threads of the engine [default: as many as there are processors]
     #[arg(long, value_name = "N", value_parser = parse_count, allow_negative_numbers = true)]
     pub threads: Option<NonZeroUsize>,
-    /// Tell methods that know cameras the capture's own pose at the time of each frame: what a client
-    /// that sends late cameras gets. Their rows say so.
+    /// Tell methods that know cameras the capture's own pose at the time of each frame: what a
+    /// client that sends late cameras gets. Their rows say so.
     #[arg(long)]
     pub late_camera: bool,
-    /// Blur in in-between frames, made up for in their keys: off, on, or auto, as far as no flicker is
-    /// seen.
+    /// Blur in in-between frames, made up for in their keys: off, on, or auto, as far as no flicker
+    /// is seen.
     #[arg(long, default_value_t = FinishMode::Off)]
     pub finish: FinishMode,
-    /// Compare what an eye that follows the motion sees, too: of the frames, of the keys alone, and of
-    /// the true frames.
+    /// Compare what an eye that follows the motion sees, too: of the frames, of the keys alone, and
+    /// of the true frames.
     #[arg(long)]
     pub retina: bool,
-    /// Display that frames are finished for: a built-in profile (see `perception displays`) or a file
-    /// that ends in .toml.
+    /// Display that frames are finished for: a built-in profile (see `perception displays`) or a
+    /// file that ends in .toml.
     #[arg(long, value_name = "NAME")]
     pub profile: Option<String>,
     /// Refresh rate that `--finish auto` is for, 1 to 1000.

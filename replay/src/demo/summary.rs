@@ -299,8 +299,8 @@ struct Compared {
 }
 
 impl Compared {
-    /// Those that fell on a refresh of the rehearsal, or else those kept for the sheet, all of whose
-    /// rows there are and whose truth is rendered for it.
+    /// Those that fell on a refresh of the rehearsal, or else those kept for the sheet, all of
+    /// whose rows there are and whose truth is rendered for it.
     fn new(seen: &Seen, rehearsal: &Rehearsal) -> Self {
         let is_made = |shown: &&Shown| shown.kind == OutputKind::Synthesised;
         let on_grid = seen.frames.iter().filter(is_made).filter_map(|shown| shown.psnr_rgb_db);

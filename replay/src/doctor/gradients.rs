@@ -1,4 +1,5 @@
-//! Finds the smooth gradients of a picture: runs of pixels along which every channel follows a line.
+//! Finds the smooth gradients of a picture: runs of pixels along which every channel follows a
+//! line.
 
 use foreframe_perception::banding::{BandWidth, Gradient};
 

@@ -1,5 +1,5 @@
-//! Looks for what is wrong with a capture: its motion, by the engine's own check, and the bits of its
-//! colours, by the banding model.
+//! Looks for what is wrong with a capture: its motion, by the engine's own check, and the bits of
+//! its colours, by the banding model.
 
 mod gradients;
 

@@ -111,8 +111,8 @@ impl<S: ReadAt> CaptureRecording<S> {
         Ok(Some(ppd))
     }
 
-    /// A refresh of the display that the daemon worked with when it recorded. None where the capture
-    /// comes from elsewhere.
+    /// A refresh of the display that the daemon worked with when it recorded. None where the
+    /// capture comes from elsewhere.
     ///
     /// # Errors
     /// If it is not a time before the first key arrived.

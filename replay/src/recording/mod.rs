@@ -118,7 +118,8 @@ impl Frame {
 pub enum Wanted {
     /// Colour alone: a ground truth.
     Color,
-    /// Colour, depth, mask, user interface, and one of the motion planes of [`FrameHead::motions`], if any.
+    /// Colour, depth, mask, user interface, and one of the motion planes of [`FrameHead::motions`],
+    /// if any.
     Key {
         /// Which one.
         motion: Option<usize>,

@@ -2,11 +2,11 @@
 //!
 //! Didyk et al. 2010, figure 8: an eye that follows a surface adds up what the display shows along
 //! its path. Of each key, the light of the frames around it is collected while the gaze of every
-//! receptor moves with the surface that the key shows there
-//! (`foreframe_perception::retina`): of the true frames, of the keys alone, each held until the next,
-//! and of the frames that a method made. The window is the time from key to key, 25 ms at 40 Hz,
-//! which is what the fovea fuses, and its middle is the middle of the key: so the keys alone lie
-//! where the true frames lie, and what they lose is sharpness, not place.
+//! receptor moves with the surface that the key shows there (`foreframe_perception::retina`): of
+//! the true frames, of the keys alone, each held until the next, and of the frames that a method
+//! made. The window is the time from key to key, 25 ms at 40 Hz, which is what the fovea fuses, and
+//! its middle is the middle of the key: so the keys alone lie where the true frames lie, and what
+//! they lose is sharpness, not place.
 //!
 //! The images are compared as 8-bit codes, like any other picture.
 
@@ -176,8 +176,8 @@ pub fn closeness(seen: &Srgb8, truly: &Srgb8) -> [f64; 2] {
     [psnr_rgb_db(seen, truly), ssim(seen, truly)]
 }
 
-/// Of a displacement that spans `frames` frames, one per cell of a grid that covers the picture, the
-/// motion per frame of each pixel of `size`; 0 where it is not known.
+/// Of a displacement that spans `frames` frames, one per cell of a grid that covers the picture,
+/// the motion per frame of each pixel of `size`; 0 where it is not known.
 #[must_use]
 pub fn gaze_of(displacement: &Plane<[f32; 2]>, frames: f32, size: [u32; 2]) -> Plane<[f32; 2]> {
     let cells = [displacement.width(), displacement.height()];

@@ -2,9 +2,10 @@
 //!
 //! A method that extrapolates has been given nothing later than the newest key when it makes its
 //! frames. One that interpolates is given the next key first, unless a cut lies before that key:
-//! then it has no more to go by than the others. With [`ScoreOptions::late_camera`], and not without,
-//! methods that know cameras are told the pose at the time of each frame. Work times are the engine's own reports, and
-//! while an engine works nothing else runs here; comparing is done afterwards, in parallel.
+//! then it has no more to go by than the others. With [`ScoreOptions::late_camera`], and not
+//! without, methods that know cameras are told the pose at the time of each frame. Work times are
+//! the engine's own reports, and while an engine works nothing else runs here; comparing is done
+//! afterwards, in parallel.
 
 use std::num::NonZeroUsize;
 use std::ops::Range;

@@ -134,8 +134,9 @@ impl MethodTally {
         self.frame_ms.add(work.as_ms_f64());
     }
 
-    /// Adds the frames after one key, in order, from number `first` on. `is_whole`: they reach to the next key, so that
-    /// the step from the last of them to that key is one of successive output frames.
+    /// Adds the frames after one key, in order, from number `first` on. `is_whole`: they reach to
+    /// the next key, so that the step from the last of them to that key is one of successive output
+    /// frames.
     pub fn add_frames(
         &mut self,
         first: usize,

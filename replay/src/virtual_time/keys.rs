@@ -1,4 +1,5 @@
-//! When the keys, the late cameras and the user interfaces of a recording arrive on the virtual clock.
+//! When the keys, the late cameras and the user interfaces of a recording arrive on the virtual
+//! clock.
 
 use foreframe_engine::MonoTime;
 

@@ -118,8 +118,8 @@ pub struct TimedUi {
     pub plane: OwnedPlane,
 }
 
-/// Replays `keys`, with the user interfaces `uis` between them, and hands each output frame to `show`.
-/// Ends one key interval after the last key, and not before everything was shown.
+/// Replays `keys`, with the user interfaces `uis` between them, and hands each output frame to
+/// `show`. Ends one key interval after the last key, and not before everything was shown.
 ///
 /// # Errors
 /// Those of `keys`, of `uis` and of `show`.

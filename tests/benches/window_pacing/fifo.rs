@@ -1,5 +1,5 @@
-//! A plain Wayland client: it draws the next frame when the compositor asks for one, as a swapchain in
-//! FIFO mode does, and takes down when each was shown.
+//! A plain Wayland client: it draws the next frame when the compositor asks for one, as a swapchain
+//! in FIFO mode does, and takes down when each was shown.
 
 use std::fs::File;
 use std::os::fd::AsFd as _;

@@ -1,5 +1,6 @@
-//! The daemon's windows on real compositors: how often a frame is shown when it was planned, how even
-//! the frames are, and how long they take, beside a plain client that draws whenever it is asked to.
+//! The daemon's windows on real compositors: how often a frame is shown when it was planned, how
+//! even the frames are, and how long they take, beside a plain client that draws whenever it is
+//! asked to.
 //!
 //! `cargo bench -p foreframe-tests --bench window_pacing [-- SECONDS [COMPOSITOR[:HZ]...]]`. The
 //! application runs at 40 keys a second, 640x360, full screen; the first second is not counted.

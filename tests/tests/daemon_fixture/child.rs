@@ -107,8 +107,8 @@ impl ChildProcess {
         command
     }
 
-    /// A daemon that shows windows on the display that `environment` leads to, and writes its log to
-    /// a file.
+    /// A daemon that shows windows on the display that `environment` leads to, and writes its log
+    /// to a file.
     pub(crate) fn daemon_with_windows(
         socket: &Path,
         environment: &[(&'static str, String)],

@@ -35,7 +35,8 @@ impl CpuBackend {
         }
     }
 
-    /// Makes a picture after the key that was taken last into `out`, which has the size and format of the keys.
+    /// Makes a picture after the key that was taken last into `out`, which has the size and format
+    /// of the keys.
     pub fn make(&mut self, pool: &ThreadPool, frame: &FrameInput<'_>, out: &mut ColorPlane) {
         let FrameInput { method, phase, newest: key, previous, map, .. } = *frame;
         match (method, previous) {

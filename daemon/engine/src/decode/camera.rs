@@ -124,8 +124,8 @@ pub(crate) struct StillWorld {
 }
 
 impl StillWorld {
-    /// Between what `key`'s motion points back to, which is `older`, and `key`. None unless cameras and
-    /// depth say where the world is.
+    /// Between what `key`'s motion points back to, which is `older`, and `key`. None unless cameras
+    /// and depth say where the world is.
     pub(crate) fn between(older: &KeyFrame, key: &KeyFrame) -> Option<Self> {
         let newer = key.camera?;
         let size = super::size(key.valid);
@@ -137,7 +137,8 @@ impl StillWorld {
         })
     }
 
-    /// Newer minus older position, pixels, of the still point at pixel `x`, `y` of the image `valid`.
+    /// Newer minus older position, pixels, of the still point at pixel `x`, `y` of the image
+    /// `valid`.
     #[expect(clippy::cast_precision_loss, reason = "sizes up to 8192 are exact")]
     #[expect(clippy::cast_possible_truncation, reason = "depth as the buffer holds it")]
     pub(crate) fn displacement(&self, valid: Rect, [x, y]: [f32; 2], depth_key: u32) -> [f32; 2] {

@@ -87,9 +87,9 @@ impl DecodeScratch {
         dilate_motion(pool, &params, &key.depth, &self.displacement, &mut key.velocity);
     }
 
-    /// Gives `key`, which was decoded last and has no motion, that which `flow` found since `from`, as
-    /// if it had been decoded. Motion that no eye can follow is damped where `pixels_per_degree` is
-    /// given.
+    /// Gives `key`, which was decoded last and has no motion, that which `flow` found since `from`,
+    /// as if it had been decoded. Motion that no eye can follow is damped where `pixels_per_degree`
+    /// is given.
     pub fn take_flow(
         &mut self,
         pool: &ThreadPool,

@@ -1,15 +1,16 @@
 //! Is the client's motion what the client says it is? Asked of the first keys that move, by luma.
 //!
 //! What a key shows at x, the key that its motion points back to has shown at x - D. Under every
-//! [`Hypothesis`] of how the motion plane was meant, D is worked out anew from what was decoded, and
+//! [`Hypothesis`] of how the motion plane was meant, D is worked out anew from what was decoded,
+//! and
 //!
 //! ```text
 //! (1) e = sqrt(mean of (L(x) - L'(x - D))^2)         L, L' luma in 8-bit levels
 //! ```
 //!
-//! is taken over the same samples for all: at most [`MOST_SAMPLES`] a key, those that move under some
-//! hypothesis. If what was declared is right, no other way of reading comes near it. Sums are integers.
-//! Nothing in the pictures depends on what is found; it is for the client's eyes.
+//! is taken over the same samples for all: at most [`MOST_SAMPLES`] a key, those that move under
+//! some hypothesis. If what was declared is right, no other way of reading comes near it. Sums are
+//! integers. Nothing in the pictures depends on what is found; it is for the client's eyes.
 
 mod hypothesis;
 
@@ -29,8 +30,9 @@ use hypothesis::Known;
 const MOST_SAMPLES: u32 = 4096;
 /// Motion that counts, pixels.
 const MOVED_PX: f32 = 0.25;
-/// Another way of reading is believed where its error squared is below this part of that as declared.
-/// In sound captures none comes below it: halving or doubling a motion of a few pixels leaves more.
+/// Another way of reading is believed where its error squared is below this part of that as
+/// declared. In sound captures none comes below it: halving or doubling a motion of a few pixels
+/// leaves more.
 const CLEARLY: f64 = 0.7;
 /// Motion explains something where its error squared is below this part of that of standing still.
 const WORTH: f64 = 0.9;
@@ -80,8 +82,8 @@ impl MotionCheck {
         self.keys_left == 0
     }
 
-    /// Looks at `key`, whose motion as decoded is `displacement`, and which follows `older`. Keys whose
-    /// motion points back to another one, and cuts, tell nothing.
+    /// Looks at `key`, whose motion as decoded is `displacement`, and which follows `older`. Keys
+    /// whose motion points back to another one, and cuts, tell nothing.
     pub(crate) fn look(
         &mut self,
         format: &StreamFormat,

@@ -34,7 +34,8 @@ fn texture(x: i32, y: i32) -> u32 {
     at(2) / 2 + at(9) + at(31) / 2
 }
 
-/// Key `n` of a picture that moves by `STEP` from key to key, whose plane says that it moves by `d`.
+/// Key `n` of a picture that moves by `STEP` from key to key, whose plane says that it moves by
+/// `d`.
 fn key(n: i32, d: [f32; 2]) -> (KeyFrame, Plane<[f32; 2]>) {
     let [width, height] = SIZE;
     let shows = |x: u32, y: u32| {

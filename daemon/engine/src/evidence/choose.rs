@@ -11,8 +11,8 @@ use crate::trajectory::surface::is_same_surface;
 
 /// Samples around one that are judged with it, per side: 5x5.
 const REACH: u32 = 2;
-/// How much worse than the best the image's rung may be on a surface of a single sample; of several,
-/// this over their number.
+/// How much worse than the best the image's rung may be on a surface of a single sample; of
+/// several, this over their number.
 const DOUBT: f32 = 0.5;
 /// A cheaper rung may be worse than the best by this: the error of a tenth of a pixel,
 const TOLERANCE: f32 = 0.002_5;
@@ -24,8 +24,8 @@ const TOLERANCE_SHARE: f32 = 0.05;
 const GOOD: f32 = 0.01;
 /// or where the motion field has failed by so much more.
 const CLEARLY: f32 = 0.05;
-/// How many tolerances the rung in use may be worse than the best; and by what part of one a cheaper
-/// rung may be, so as to take its place.
+/// How many tolerances the rung in use may be worse than the best; and by what part of one a
+/// cheaper rung may be, so as to take its place.
 const HYSTERESIS: f32 = 3.0;
 
 /// Gives every sample its rung, and returns that of the image as a whole, which was `image`.
@@ -127,8 +127,8 @@ struct Score {
     share: u8,
 }
 
-/// One of so many samples of a surface has at least to have motion that is news: a surface jumps as a
-/// whole, and a vector that is wrong alone is none of its neighbours' business.
+/// One of so many samples of a surface has at least to have motion that is news: a surface jumps as
+/// a whole, and a vector that is wrong alone is none of its neighbours' business.
 const NEWS_OF: u32 = 2;
 
 /// [`Score`] at one sample; None where nothing is known of the surface.
@@ -169,8 +169,8 @@ struct Preferred {
     slack: Option<f32>,
 }
 
-/// The first of `preferred` that is good enough, unless a cheaper one is as good as the best; else the
-/// cheapest rung within the tolerance of the best.
+/// The first of `preferred` that is good enough, unless a cheaper one is as good as the best; else
+/// the cheapest rung within the tolerance of the best.
 #[inline(always)]
 fn cheapest(score: &PerRung, order: CameraOrder, preferred: &[Preferred]) -> Rung {
     let linear = index_of(Rung::Linear);
@@ -206,8 +206,8 @@ mod tests {
 
     const ORDER: CameraOrder = CameraOrder::Damped;
 
-    /// The score with these numbers for hold, global, linear, affine, quadratic and the worlds; flow
-    /// has nothing to say.
+    /// The score with these numbers for hold, global, linear, affine, quadratic and the worlds;
+    /// flow has nothing to say.
     fn score(of: [f32; 6]) -> PerRung {
         [of[0], of[1], of[2], of[3], of[4], of[5], of[5], of[5], of[2]]
     }

@@ -20,8 +20,8 @@ use crate::trajectory::quadratic::Quadratic;
 use crate::trajectory::rung::Rung;
 use crate::trajectory::surface::{Around, is_same_surface};
 
-/// c of (2), pixels at the next key: an in-between frame in the middle has half of the error or less,
-/// and a picture loses most of its contrast where it is a pixel off.
+/// c of (2), pixels at the next key: an in-between frame in the middle has half of the error or
+/// less, and a picture loses most of its contrast where it is a pixel off.
 const CONTRAST_PX: f32 = 2.0;
 /// Keys that (3) averages over.
 const KEYS: u8 = 4;
@@ -80,7 +80,8 @@ pub(super) struct Measuring<'a> {
     pub(super) before: &'a Plane<Sample>,
     /// The rung of what has no history.
     pub(super) image_rung: Rung,
-    /// Which samples are measured by the whole ladder: every so many runs of eight, and which of them.
+    /// Which samples are measured by the whole ladder: every so many runs of eight, and which of
+    /// them.
     pub(super) turn: [u32; 2],
     /// Whether nothing but the camera's order is asked for.
     pub(super) orders_alone: bool,
@@ -262,8 +263,8 @@ impl Measuring<'_> {
     }
 }
 
-/// The part of the motion `d` that was foreseen, in sixteenths, where every rung's error is more than
-/// half of it.
+/// The part of the motion `d` that was foreseen, in sixteenths, where every rung's error is more
+/// than half of it.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "0 to 16")]
 #[expect(clippy::cast_sign_loss, reason = "0 to 16")]
@@ -281,13 +282,14 @@ fn share(d: [f32; 2], foreseen: [f32; 2], now: &PerRung) -> u8 {
     (part.clamp(0.0, 1.0) * f32::from(Lead::WHOLE) + 0.5) as u8
 }
 
-/// Part of a motion beyond which its error makes it news: there is more of it that nobody foresaw than
-/// somebody did.
+/// Part of a motion beyond which its error makes it news: there is more of it that nobody foresaw
+/// than somebody did.
 const NEWS: f32 = 0.5;
 /// And the least error, pixels: half of [`CONTRAST_PX`].
 const NEWS_PX: f32 = 1.0;
 
-/// Runs further on that those measured by the whole ladder lie in the next row: not below each other.
+/// Runs further on that those measured by the whole ladder lie in the next row: not below each
+/// other.
 const TURN_STEP: u32 = 5;
 
 /// The cell of the surface of depth key `depth` (any, if None) that is nearest to a place, if one

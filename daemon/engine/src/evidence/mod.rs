@@ -1,8 +1,8 @@
 //! Evidence: each key is the truth for what every rung predicted of it.
 //!
-//! When a key arrives, one cell of every 4x4 of its field, a *sample*, is followed back along its own
-//! motion to the key before, where the cell of its surface (depth agrees) is asked where each rung
-//! had said that it would be by now:
+//! When a key arrives, one cell of every 4x4 of its field, a *sample*, is followed back along its
+//! own motion to the key before, where the cell of its surface (depth agrees) is asked where each
+//! rung had said that it would be by now:
 //!
 //! ```text
 //! (1) e(r)  = |d_r(p) - D|                 p the phase of the new key after the old one, D its motion
@@ -11,29 +11,29 @@
 //! (4) S(r)  = mean of m over those of 5x5 samples that lie on the surface
 //! ```
 //!
-//! The camera's order belongs to the whole image, and is chosen for it from
-//! those samples that move with the world ([`CameraOrder`]). Of the rungs the cheapest is taken
-//! whose S is within a tolerance of the best. The rung in use stays until it is worse by more, and the
-//! rung that the whole image would take, by the mean of m over it, is preferred the more, the fewer
-//! samples there are to judge a surface by.
+//! The camera's order belongs to the whole image, and is chosen for it from those samples that move
+//! with the world ([`CameraOrder`]). Of the rungs the cheapest is taken whose S is within a
+//! tolerance of the best. The rung in use stays until it is worse by more, and the rung that the
+//! whole image would take, by the mean of m over it, is preferred the more, the fewer samples there
+//! are to judge a surface by.
 //!
-//! Where the rungs have failed and most of a surface's motion is news, it may be a jump as well as a
-//! beginning: only that part of it goes on which was foreseen. That limits overshoot where
-//! something turns back, and a vector that is wrong for one key moves nothing. Wrong
-//! vectors that stay are found by luma ([`trust`]).
+//! Where the rungs have failed and most of a surface's motion is news, it may be a jump as well as
+//! a beginning: only that part of it goes on which was foreseen. That limits overshoot where
+//! something turns back, and a vector that is wrong for one key moves nothing. Wrong vectors that
+//! stay are found by luma ([`trust`]).
 //!
-//! A shadow, a reflection and a texture that runs move otherwise than the surface that shows them. Where
-//! luma says so of two keys in a row, and flow explains what their motion does not
-//! ([`crate::trajectory::flow`]), D is that flow, in all of the above: a sample then stands for what is
-//! seen there and not for the surface.
+//! A shadow, a reflection and a texture that runs move otherwise than the surface that shows them.
+//! Where luma says so of two keys in a row, and flow explains what their motion does not
+//! ([`crate::trajectory::flow`]), D is that flow, in all of the above: a sample then stands for
+//! what is seen there and not for the surface.
 //!
-//! What is not needed is not measured: `hold`, `linear` and the rung in use always, the others where
-//! that has failed, and in a sixteenth of the samples in turn. A richer rung that is not
+//! What is not needed is not measured: `hold`, `linear` and the rung in use always, the others
+//! where that has failed, and in a sixteenth of the samples in turn. A richer rung that is not
 //! measured counts as good as the one in use, which has not failed; a cheaper one keeps its mean.
 //!
 //! Geometry alone: nothing is warped for it, and nothing photometric makes it doubt. Floats,
-//! deterministic as in [`crate::trajectory`]; each sample for itself and sums row by row in order, so
-//! that the number of threads changes nothing.
+//! deterministic as in [`crate::trajectory`]; each sample for itself and sums row by row in order,
+//! so that the number of threads changes nothing.
 
 mod choose;
 mod measure;
@@ -198,8 +198,8 @@ impl Default for Evidence {
 }
 
 impl Evidence {
-    /// Takes in what `key`, whose `models` are new, shows of the `predictions` of the key before it;
-    /// None where there were none. `is_still` says which samples move with the world.
+    /// Takes in what `key`, whose `models` are new, shows of the `predictions` of the key before
+    /// it; None where there were none. `is_still` says which samples move with the world.
     pub fn update(
         &mut self,
         pool: &ThreadPool,
@@ -281,8 +281,8 @@ impl Evidence {
         self.shared.data_mut().fill(index_of(self.image_rung) as u8);
     }
 
-    /// Whether the homography of the key to come is wanted: it is in use, or one of a few keys by which
-    /// it is judged.
+    /// Whether the homography of the key to come is wanted: it is in use, or one of a few keys by
+    /// which it is judged.
     #[must_use]
     pub fn asks_for_global(&self) -> bool {
         let is_used = || self.leads.data().iter().any(|lead| lead.rung == Rung::Global);
@@ -322,9 +322,9 @@ impl Evidence {
         RUNGS.get(usize::from(*first)).copied().filter(|_| is_one)
     }
 
-    /// What leads a cell of depth key `depth` of the newest key on: that of the sample of its surface
-    /// which is nearest to it among its own and those around, else [`unproven`] of the image's: a thing
-    /// so thin that no sample lies on it goes by what the key says of it.
+    /// What leads a cell of depth key `depth` of the newest key on: that of the sample of its
+    /// surface which is nearest to it among its own and those around, else [`unproven`] of the
+    /// image's: a thing so thin that no sample lies on it goes by what the key says of it.
     #[must_use]
     #[inline(always)]
     pub fn lead_at(&self, x: u32, y: u32, depth: u32) -> Lead {

@@ -1,7 +1,7 @@
 //! Where the newest key's motion explains its picture no better than standing still would.
 //!
-//! Evidence compares motion with motion: of vectors that are wrong in the same way key after key
-//! (a sign, a scale, noise) it knows nothing, nor of a cut that nobody declared. Luma does: what the
+//! Evidence compares motion with motion: of vectors that are wrong in the same way key after key (a
+//! sign, a scale, noise) it knows nothing, nor of a cut that nobody declared. Luma does: what the
 //! key shows at x, the key before has shown at x - D, if D is right. Over samples that have moved:
 //!
 //! ```text
@@ -16,9 +16,9 @@
 //! trusted is held: between those two keys its motion would have been no better.
 //!
 //! A key whose whole picture has little in common with the one before, where it came from, whose
-//! regions are not as bright as they were either, and whose motion, if there is any, fails (6), is a
-//! cut that nobody declared. Noise fails the first and passes the second, a change of light
-//! the other way round; where much is covered and uncovered, motion passes (6).
+//! regions are not as bright as they were either, and whose motion, if there is any, fails (6), is
+//! a cut that nobody declared. Noise fails the first and passes the second, a change of light the
+//! other way round; where much is covered and uncovered, motion passes (6).
 //!
 //! Sums are integers, and do not depend on the order.
 
@@ -136,7 +136,8 @@ impl Sums {
         Worth { count: self.moved.count, moved, still }
     }
 
-    /// Correlation of luma with what it was where it came from, by the variance of their difference.
+    /// Correlation of luma with what it was where it came from, by the variance of their
+    /// difference.
     fn correlation(&self) -> f64 {
         let [now, then] = [self.luma[0].variance(), self.luma[1].variance()];
         if now + then <= 0.0 { 1.0 } else { 1.0 - self.residual.variance() / (now + then) }
@@ -153,8 +154,8 @@ pub(super) struct Trust {
 }
 
 impl Trust {
-    /// Looks at what the motion of `key`, whose field is that of `lattice`, makes of `older`, which it
-    /// points back to. `turn` says which half of the samples are read.
+    /// Looks at what the motion of `key`, whose field is that of `lattice`, makes of `older`, which
+    /// it points back to. `turn` says which half of the samples are read.
     pub(super) fn update(
         &mut self,
         pool: &ThreadPool,

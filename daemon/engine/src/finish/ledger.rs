@@ -1,9 +1,9 @@
 //! Which picture is a key, which is blurred, and who has paid for whom.
 //!
-//! A key that is sharpened for n in-between frames has paid for n blurred ones. Each blurred picture
-//! uses up one that was paid for; with none left, pictures are shown as they are. What a key has
-//! paid for and nobody has shown stays for the next key, which then pays for less. So the light of
-//! any run of pictures of a still surface is that of as many originals, but for
+//! A key that is sharpened for n in-between frames has paid for n blurred ones. Each blurred
+//! picture uses up one that was paid for; with none left, pictures are shown as they are. What a
+//! key has paid for and nobody has shown stays for the next key, which then pays for less. So the
+//! light of any run of pictures of a still surface is that of as many originals, but for
 //!
 //! ```text
 //! (1) (paid for and not shown) * (original - blurred)

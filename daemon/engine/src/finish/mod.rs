@@ -2,9 +2,9 @@
 //!
 //! Didyk et al. 2010, *Perceptually-motivated real-time temporal upsampling of 3D content for
 //! high-refresh-rate displays*, sections 5.1 and 6. Fine detail of a made picture is what is wrong
-//! first; at a high refresh rate the eye adds up N pictures and cannot tell which of them the detail
-//! came from. So in-between frames lose theirs, and the key has it N times over. With `o` a picture,
-//! `b` its blur ([`pyramid`]) and `l` the light that the display makes of a level:
+//! first; at a high refresh rate the eye adds up N pictures and cannot tell which of them the
+//! detail came from. So in-between frames lose theirs, and the key has it N times over. With `o` a
+//! picture, `b` its blur ([`pyramid`]) and `l` the light that the display makes of a level:
 //!
 //! ```text
 //! (1) i = b, or where no key could make up for it, or the two would be seen to flicker, as close to
@@ -14,8 +14,8 @@
 //!
 //! ([`compensate`]; the arithmetic is `foreframe_perception::compensation`, integers from tables.)
 //! Light of N frames is N times the original's within half a level per frame, by the display that
-//! the stream or the configuration names. Where the picture is flat nothing changes. How many frames
-//! come between two keys is not known before; [`ledger`] keeps account.
+//! the stream or the configuration names. Where the picture is flat nothing changes. How many
+//! frames come between two keys is not known before; [`ledger`] keeps account.
 //!
 //! Departures from the paper: (1) gives in-between frames exactly what the key cannot take; the
 //! paper keeps the original where it is darker. All of a picture is blurred, reliable or not: what

@@ -54,8 +54,8 @@ pub struct Tables {
 /// Every split of 8-bit levels. Red, green, blue.
 #[derive(Debug)]
 pub struct ByteTables {
-    /// The key's level by original * 256 + blurred, and three bytes more, so that a wide read of the
-    /// last one stays inside.
+    /// The key's level by original * 256 + blurred, and three bytes more, so that a wide read of
+    /// the last one stays inside.
     pub key: [Box<[u8]>; 3],
     /// By original: the lowest level of an in-between frame, and in the upper byte the highest.
     pub within: [Box<[u32; 256]>; 3],

@@ -1,8 +1,8 @@
 //! How long before a refresh work has to start: the work itself, and a margin for the hand-over.
 //!
-//! Work is the 95th percentile of recent frames, counted from the last instant to start, so that late
-//! scheduling counts as work. A key shown as it is takes a fraction of what an in-between frame
-//! takes, and is estimated apart. The margin widens at once after a miss and shrinks slowly.
+//! Work is the 95th percentile of recent frames, counted from the last instant to start, so that
+//! late scheduling counts as work. A key shown as it is takes a fraction of what an in-between
+//! frame takes, and is estimated apart. The margin widens at once after a miss and shrinks slowly.
 //!
 //! The frames above the 95th percentile live off the margin. Where they take more than that, again
 //! and again, the work has spikes: then it is estimated by the longest recent one, as far as that
@@ -39,7 +39,8 @@ const MARGIN_DECAY_DIVISOR: i64 = 50;
 /// How long synthesis is expected to take.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum WorkEstimate {
-    /// Learned from [`Pacer::on_work`](super::Pacer::on_work); `first` before anything was measured.
+    /// Learned from [`Pacer::on_work`](super::Pacer::on_work); `first` before anything was
+    /// measured.
     Measured {
         /// Guess for the first in-between frame.
         first: MonoSpan,

@@ -22,8 +22,8 @@ const FIRST_INTERVAL: MonoSpan = MonoSpan::from_ms(25);
 /// Velocity stays full for at most this many key intervals, in halves, however wild the jitter;
 /// with the rest of the easing that keeps the phase below 4.
 const LONGEST_LEAD_HALVES: i64 = 5;
-/// Key intervals are even if from the 5th to the 95th percentile they differ by less than a tenth of
-/// the refresh interval.
+/// Key intervals are even if from the 5th to the 95th percentile they differ by less than a tenth
+/// of the refresh interval.
 const EVEN_DIVISOR: i64 = 10;
 /// No key of late was early enough to come this much before it is expected.
 const SURPRISE: MonoSpan = MonoSpan::from_us(500);
@@ -98,8 +98,8 @@ impl KeyCadence {
         self.interval
     }
 
-    /// No key is expected before this, going by the earliest of recent ones. None if any instant may
-    /// bring one.
+    /// No key is expected before this, going by the earliest of recent ones. None if any instant
+    /// may bring one.
     pub(super) fn quiet_until(&self) -> Option<MonoTime> {
         self.quiet_until
     }

@@ -7,9 +7,9 @@
 //! line by a fraction of a percent of its velocity.
 //!
 //! Where keys come evenly but arrive unevenly, the offer of an early key is a whole refresh smaller
-//! than that of the others, and the first such key would make the line jump. When the display's clock
-//! drifts against the application's, that is foreseen: a key that was as early as the earliest of
-//! late would reach an earlier refresh by now, so the line already moves there.
+//! than that of the others, and the first such key would make the line jump. When the display's
+//! clock drifts against the application's, that is foreseen: a key that was as early as the
+//! earliest of late would reach an earlier refresh by now, so the line already moves there.
 //!
 //! Two things make it jump, both counted: the application's clock steps (content times run
 //! backwards, or leap ahead), or keys stay behind for so long that it is no jitter.
@@ -20,12 +20,12 @@ use crate::time::{MonoSpan, MonoTime};
 /// Keys that the delay looks back on: 3 s at 40 Hz. Shorter and the minimum wanders with jitter,
 /// longer and extrapolation stays needlessly long after an early key.
 const WINDOW: usize = 128;
-/// Time constant with which the delay follows its target. Found with `foreframe pacing`: eight times
-/// as long, and one early key keeps all others from being shown as they are for seconds (1 real
-/// frame of 2400 with arrivals jittering by 2 ms, against 2026), with no less judder.
+/// Time constant with which the delay follows its target. Found with `foreframe pacing`: eight
+/// times as long, and one early key keeps all others from being shown as they are for seconds (1
+/// real frame of 2400 with arrivals jittering by 2 ms, against 2026), with no less judder.
 const FOLLOW_TIME: MonoSpan = MonoSpan::from_ms(500);
-/// It changes by at most 1/64 of the time that passes: velocity on the screen stays within 1.6 %, and
-/// getting over a whole refresh (8.3 ms in half a second) costs less than 1 % of judder.
+/// It changes by at most 1/64 of the time that passes: velocity on the screen stays within 1.6 %,
+/// and getting over a whole refresh (8.3 ms in half a second) costs less than 1 % of judder.
 const FASTEST_SLEW_DIVISOR: i64 = 64;
 /// Content time that leaps ahead by more was set, not jittered.
 const FORWARD_STEP: MonoSpan = MonoSpan::from_ms(250);
@@ -80,8 +80,9 @@ struct Line {
 }
 
 impl ContentClock {
-    /// A key has arrived. Lag beyond `lag_limit` is no jitter if it lasts. `reachable` tells the first
-    /// refresh at or after a time, if it makes sense to foresee how early the next keys can be shown.
+    /// A key has arrived. Lag beyond `lag_limit` is no jitter if it lasts. `reachable` tells the
+    /// first refresh at or after a time, if it makes sense to foresee how early the next keys can
+    /// be shown.
     pub(super) fn on_key(
         &mut self,
         key: &KeyOffer,

@@ -1,13 +1,13 @@
 //! How long before a refresh a display has to have a frame.
 //!
 //! Every frame that was handed over before its refresh is evidence: with this lead it was shown in
-//! time, or a refresh late. The deadline is the lead that separates the two with the fewest frames on
-//! the wrong side. Where refreshes are missed for other reasons the late ones are spread over all
-//! leads, no lead separates them, and the deadline stays what it was. Misses widen the margin, so
-//! leads vary by themselves as long as there are misses.
+//! time, or a refresh late. The deadline is the lead that separates the two with the fewest frames
+//! on the wrong side. Where refreshes are missed for other reasons the late ones are spread over
+//! all leads, no lead separates them, and the deadline stays what it was. Misses widen the margin,
+//! so leads vary by themselves as long as there are misses.
 //!
-//! The deadline comes down slowly, so that a display which was busy for a while is tried again. It may
-//! start from a guess: a display that is always late looks like one that is never early enough.
+//! The deadline comes down slowly, so that a display which was busy for a while is tried again. It
+//! may start from a guess: a display that is always late looks like one that is never early enough.
 
 use std::collections::VecDeque;
 
@@ -20,8 +20,9 @@ const LEAST_EXPLAINED: i64 = 2;
 /// Frames in time with a larger lead that it takes to believe in a deadline: where none is in time,
 /// the display needs a whole refresh more.
 const LEAST_IN_TIME: usize = 4;
-/// Times that frames with a smaller lead begin to be late that it takes: when a display shows nothing
-/// for a while, leads have just been falling, and any of them would separate that from what was before.
+/// Times that frames with a smaller lead begin to be late that it takes: when a display shows
+/// nothing for a while, leads have just been falling, and any of them would separate that from what
+/// was before.
 const LEAST_EPISODES: usize = 2;
 /// Added to the lead of a late frame. With half of it, it comes down to late frames twice as often.
 const STEP: MonoSpan = MonoSpan::from_us(500);

@@ -26,13 +26,14 @@ const OVERDUE_LIMIT: usize = 2;
 const PATIENCE: MonoSpan = MonoSpan::from_ms(100);
 /// After so many answers in a row that never came the display is one that does not answer.
 const SILENT_LIMIT: u32 = 8;
-/// A frame shown so much later after the one before than planned came after the deadline, as a share
-/// of the interval in percent. Displays without a beam show such a frame a little late, not at the
-/// next refresh, and go on from there. Timestamps of software are off by 12 % at 144 Hz.
+/// A frame shown so much later after the one before than planned came after the deadline, as a
+/// share of the interval in percent. Displays without a beam show such a frame a little late, not
+/// at the next refresh, and go on from there. Timestamps of software are off by 12 % at 144 Hz.
 const LATE_PERCENT: i64 = 18;
 /// Frames that tell whether any is ever shown as soon as planned.
 const PASSAGE_WINDOW: usize = 32;
-/// They are not, if the shortest passage is longer than the usual lead by this share of the interval.
+/// They are not, if the shortest passage is longer than the usual lead by this share of the
+/// interval.
 const PASSAGE_PERCENT: i64 = 5;
 /// Frames that the lateness of a display looks back on.
 const LATENESS_WINDOW: usize = 16;
@@ -183,8 +184,8 @@ impl Flight {
         self.waiting.drain(..=position).next_back()
     }
 
-    /// By how much longer than planned the frame before was shown: when a display goes on from a late
-    /// frame, those after it are late, too, and not to blame.
+    /// By how much longer than planned the frame before was shown: when a display goes on from a
+    /// late frame, those after it are late, too, and not to blame.
     fn gap_before(&self, planned: MonoTime, late: MonoSpan, interval: MonoSpan) -> MonoSpan {
         let Some((before, shown)) = self.shown else { return late };
         let half = interval.scale(1, 2);
@@ -192,8 +193,8 @@ impl Flight {
         planned + late - shown - interval.scale(steps, 1)
     }
 
-    /// A display that shows frames when it gets them shows all of them late if all come too late, and
-    /// seems to refresh more slowly. It gives itself away by never showing one sooner.
+    /// A display that shows frames when it gets them shows all of them late if all come too late,
+    /// and seems to refresh more slowly. It gives itself away by never showing one sooner.
     fn learn_passage(&mut self, lead: MonoSpan, passage: MonoSpan, interval: MonoSpan) {
         self.leads.push(lead);
         self.passages.push(passage);
@@ -330,8 +331,8 @@ mod tests {
         assert_eq!(flight.offset(), 0);
     }
 
-    /// Shows each frame when it gets it, but not sooner than `passage` later or one interval after the
-    /// frame before. Frames are planned one interval after the frame that was shown last.
+    /// Shows each frame when it gets it, but not sooner than `passage` later or one interval after
+    /// the frame before. Frames are planned one interval after the frame that was shown last.
     fn shown_when_it_comes(
         flight: &mut Flight,
         passage: MonoSpan,

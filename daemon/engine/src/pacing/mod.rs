@@ -11,11 +11,11 @@
 //!
 //! The parts, one idea each: [`refresh`] tracks the display's period and phase from presentation
 //! feedback, [`rate_doubt`] finds out whether it tells the truth about its rate, [`flight`] what
-//! became of the frames under way, and [`deadline`] how early it needs them; [`content`] maps present time to content time through one slowly moving delay;
-//! [`cadence`] learns when the next key is overdue; [`easing`] brings motion to rest when it is;
-//! [`budget`] learns how long before the refresh work has to start. All decisions are integer
-//! arithmetic. Frames are planned on the grid of the display, or, where it has none, so that keys find
-//! it free ([`variable`]).
+//! became of the frames under way, and [`deadline`] how early it needs them; [`content`] maps
+//! present time to content time through one slowly moving delay; [`cadence`] learns when the next
+//! key is overdue; [`easing`] brings motion to rest when it is; [`budget`] learns how long before
+//! the refresh work has to start. All decisions are integer arithmetic. Frames are planned on the
+//! grid of the display, or, where it has none, so that keys find it free ([`variable`]).
 //!
 //! [`timer`] is the grid of sinks that have no display behind them; [`sim`] runs a pacer against a
 //! simulated display and application.

@@ -81,8 +81,8 @@ impl Pacer {
         self.interpolates = interpolates;
     }
 
-    /// Makes a picture for every `refreshes`-th refresh from now on, at least 1, but one that has news,
-    /// as the first of a key may, as soon as ever.
+    /// Makes a picture for every `refreshes`-th refresh from now on, at least 1, but one that has
+    /// news, as the first of a key may, as soon as ever.
     pub fn set_stride(&mut self, refreshes: u32) {
         self.stride = refreshes.max(1);
     }
@@ -187,8 +187,8 @@ impl Pacer {
         Plan { wake_at, wake_by, submit_from, submit_by, present_at, content_time }
     }
 
-    /// How much sooner a picture is begun than it has to be by `wake_by`. A key that comes between the
-    /// two would be shown a refresh later for it, so only while none is expected.
+    /// How much sooner a picture is begun than it has to be by `wake_by`. A key that comes between
+    /// the two would be shown a refresh later for it, so only while none is expected.
     fn head_start(&self, wake_by: MonoTime, shows: Shows) -> MonoSpan {
         let is_quiet = self.cadence.quiet_until().is_some_and(|until| wake_by < until);
         if is_quiet && shows == Shows::InBetween && self.variable.is_none() {
@@ -247,8 +247,8 @@ impl Pacer {
         self.debug_verify();
     }
 
-    /// Making the frame that was started last took `work`, from its start, or from the plan's `wake_by`
-    /// if it started after that, to the picture being ready.
+    /// Making the frame that was started last took `work`, from its start, or from the plan's
+    /// `wake_by` if it started after that, to the picture being ready.
     pub fn on_work(&mut self, work: MonoSpan) {
         self.budget.on_work(self.in_work, work);
         self.debug_verify();
@@ -260,8 +260,8 @@ impl Pacer {
         self.on_miss();
     }
 
-    /// The picture of a started plan was handed to the display at `handed_over_at`, and an answer is
-    /// expected. Displays that need no watching, such as timers, are not told of here.
+    /// The picture of a started plan was handed to the display at `handed_over_at`, and an answer
+    /// is expected. Displays that need no watching, such as timers, are not told of here.
     pub fn on_handed_over(&mut self, plan: &Plan, handed_over_at: MonoTime) {
         let lead = plan.present_at - handed_over_at;
         self.flight.hand_over(plan.present_at, lead, handed_over_at <= plan.submit_by);
@@ -320,8 +320,8 @@ impl Pacer {
         self.debug_verify();
     }
 
-    /// The display has changed its mode: another refresh interval, another kind, or another display.
-    /// What was learned of the application stays.
+    /// The display has changed its mode: another refresh interval, another kind, or another
+    /// display. What was learned of the application stays.
     pub fn on_mode(&mut self, refresh_interval: MonoSpan, refresh: RefreshKind) {
         self.refresh.on_mode(refresh_interval);
         self.variable = variable(refresh, refresh_interval);
@@ -375,7 +375,8 @@ impl Pacer {
         !self.is_visible || self.discards_in_a_row >= DISCARDS_TO_HIDE
     }
 
-    /// Keys come as fast as the display refreshes, one for each: there is nothing to put in between.
+    /// Keys come as fast as the display refreshes, one for each: there is nothing to put in
+    /// between.
     fn keeps_up(&self) -> bool {
         self.variable.is_none() && self.cadence.keeps_up_with(self.interval())
     }

@@ -162,8 +162,8 @@ impl RefreshTracker {
             .clamp(self.announced - bound, self.announced + bound);
     }
 
-    /// The grid was no display's, but what came back of our own pace: it begins anew at `time`, and is
-    /// not slower than announced.
+    /// The grid was no display's, but what came back of our own pace: it begins anew at `time`, and
+    /// is not slower than announced.
     pub(super) fn restart_at(&mut self, time: MonoTime) {
         self.interval = self.interval.min(self.announced);
         self.begin_at(fixed(time));

@@ -34,8 +34,8 @@ pub enum RefreshKind {
 /// none lies before the `now` it was planned at.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Plan {
-    /// When to start to make the picture: sooner than it has to be while no key is expected, so that
-    /// work that takes longer than usual is still done in time.
+    /// When to start to make the picture: sooner than it has to be while no key is expected, so
+    /// that work that takes longer than usual is still done in time.
     pub wake_at: MonoTime,
     /// When to start at the latest, going by what the work usually takes.
     pub wake_by: MonoTime,
@@ -115,6 +115,7 @@ pub enum FeedbackState {
     Presented,
     /// It answers nothing. Frames are paced by the announced rate alone.
     Absent,
-    /// It throws them away, as it does with a window that nobody sees. A frame is tried now and then.
+    /// It throws them away, as it does with a window that nobody sees. A frame is tried now and
+    /// then.
     Hidden,
 }

@@ -1,10 +1,10 @@
 //! When to show in-between frames on a display that refreshes when it is given a picture.
 //!
-//! Such a display has no grid to meet, but after each picture it is blind for its shortest interval.
-//! So a key goes out at once, and in-between frames are armed where they leave it room: evenly
-//! between two keys, as many as fit even before a key that comes as early as keys usually do, and at
-//! least one, midway, if two shortest intervals fit into a key interval. When the next key is
-//! overdue, frames go on at the same pace, so that motion can come to rest.
+//! Such a display has no grid to meet, but after each picture it is blind for its shortest
+//! interval. So a key goes out at once, and in-between frames are armed where they leave it room:
+//! evenly between two keys, as many as fit even before a key that comes as early as keys usually
+//! do, and at least one, midway, if two shortest intervals fit into a key interval. When the next
+//! key is overdue, frames go on at the same pace, so that motion can come to rest.
 
 use super::recent::Recent;
 use crate::time::{MonoSpan, MonoTime};

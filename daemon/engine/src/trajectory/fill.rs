@@ -144,7 +144,8 @@ impl Filling<'_> {
     }
 }
 
-/// The part of a curve that an eye can follow: (3) and (4) of [`super::dilate_motion`], of its chord.
+/// The part of a curve that an eye can follow: (3) and (4) of [`super::dilate_motion`], of its
+/// chord.
 #[inline(always)]
 fn damped(curve: Curve, px_per_span: Option<f32>) -> Curve {
     let Some(px_per_span) = px_per_span else { return curve };

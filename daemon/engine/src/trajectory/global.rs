@@ -5,10 +5,10 @@
 //! (2) d(1) = H x - x,  d(1/2) = H^(1/2) x - x
 //! ```
 //!
-//! H is fitted to the motion field by least squares, reweighted so that what moves on its own counts
-//! little (Cauchy weights). The square root is Denman and Beavers' iteration (1976, "The matrix sign
-//! function and computations in systems"). f64, in coordinates of about -1 to 1; the fit and
-//! the iteration have a fixed number of steps.
+//! H is fitted to the motion field by least squares, reweighted so that what moves on its own
+//! counts little (Cauchy weights). The square root is Denman and Beavers' iteration (1976, "The
+//! matrix sign function and computations in systems"). f64, in coordinates of about -1 to 1; the
+//! fit and the iteration have a fixed number of steps.
 
 use glam::{DMat3, DVec3};
 

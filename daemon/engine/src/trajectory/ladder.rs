@@ -1,9 +1,9 @@
 //! One stream's ladder: prepares the rungs for each key and fills in its trajectories.
 //!
 //! [`Models`] holds what the rungs need of one key, small things that are worked out once; a rung's
-//! answer for a cell is then a function of it, the key's planes and the key before. [`Ladder`] takes
-//! the answers of the rung that the method names for every cell, lets each cell take those of the
-//! surface that its colour belongs to (dilation), and leaves them in the key as fixed point.
+//! answer for a cell is then a function of it, the key's planes and the key before. [`Ladder`]
+//! takes the answers of the rung that the method names for every cell, lets each cell take those of
+//! the surface that its colour belongs to (dilation), and leaves them in the key as fixed point.
 //!
 //! Where a rung has no answer, the motion field itself goes on: [`Rung::Linear`].
 
@@ -216,9 +216,9 @@ impl Ladder {
         &self.evidence
     }
 
-    /// Gives `key` its trajectories. It was decoded with its displacement; `older` is the key before
-    /// it, unless this one is a cut, and `before` the one before that. `flow` looks at the pictures where
-    /// motion was not estimated from them already.
+    /// Gives `key` its trajectories. It was decoded with its displacement; `older` is the key
+    /// before it, unless this one is a cut, and `before` the one before that. `flow` looks at the
+    /// pictures where motion was not estimated from them already.
     pub fn take_key(
         &mut self,
         pool: &ThreadPool,
@@ -263,8 +263,8 @@ impl Ladder {
         self.fill(pool, key, older);
     }
 
-    /// The client has moved the camera on to `view` at `time`, after its newest key. The newest pose
-    /// wins. Takes effect with [`Ladder::catch_up`].
+    /// The client has moved the camera on to `view` at `time`, after its newest key. The newest
+    /// pose wins. Takes effect with [`Ladder::catch_up`].
     pub fn late_camera(&mut self, time: MonoTime, view: [f32; 16]) {
         let Some(newest) = self.path.newest() else { return };
         let is_newer = self.late.is_none_or(|late| time > late.time) && time > newest.time;

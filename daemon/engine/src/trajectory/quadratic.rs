@@ -42,8 +42,8 @@ impl<'a> Quadratic<'a> {
         })
     }
 
-    /// The depth key of the older field where a point was that is at pixel `at` now, came by `d`, and
-    /// has depth key `depth`: that of the cell of its own surface nearest to there.
+    /// The depth key of the older field where a point was that is at pixel `at` now, came by `d`,
+    /// and has depth key `depth`: that of the cell of its own surface nearest to there.
     #[must_use]
     #[inline(always)]
     pub fn depth_before(&self, at: [f32; 2], d: [f32; 2], depth: u32) -> Option<u32> {

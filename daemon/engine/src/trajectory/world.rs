@@ -15,8 +15,8 @@
 //! picture and the depth that the older key has there. h, a pixel scaled by its distance, is linear
 //! in the place, so that no matrix has to be undone. Where the older key shows no such surface the
 //! point goes on along its motion vector. Where the field knows no motion a point is taken to be
-//! still; and so is the background where nothing was drawn (depth key 0), which engines leave without
-//! vectors.
+//! still; and so is the background where nothing was drawn (depth key 0), which engines leave
+//! without vectors.
 
 use super::camera_path::{Onward, Reprojection};
 use super::curve::{Curve, Curves};
@@ -61,8 +61,8 @@ impl World {
         })
     }
 
-    /// (2) or (3) of a cell; `older` reads the key before. NaN where the point is not in front of the
-    /// camera.
+    /// (2) or (3) of a cell; `older` reads the key before. NaN where the point is not in front of
+    /// the camera.
     #[must_use]
     #[inline(always)]
     pub fn curve(

@@ -1,7 +1,7 @@
 //! (2) of [`super`] for one channel, by integers.
 //!
-//! A finite half is m 2^e with m below 2^11 and e from -24 to 5: in steps of 2^-24 it has at most 40
-//! bits, and its product with a weight in the same steps at most 64.
+//! A finite half is m 2^e with m below 2^11 and e from -24 to 5: in steps of 2^-24 it has at most
+//! 40 bits, and its product with a weight in the same steps at most 64.
 
 use crate::color::{half_to_ordered, ordered_to_half};
 

@@ -4,18 +4,18 @@
 //! backends have made when that has been read back: so it is the same for all of them. It may
 //! change between two keys, as often as the display shows pictures.
 //!
-//! With `u` the plane, `a` its alpha, `p` the picture, `m` the largest alpha and `a'` the level `a` of
-//! a channel's own range, every channel, alpha too, rounded to nearest:
+//! With `u` the plane, `a` its alpha, `p` the picture, `m` the largest alpha and `a'` the level `a`
+//! of a channel's own range, every channel, alpha too, rounded to nearest:
 //!
 //! ```text
 //! (1) rgba8, rgb10a2   min(u, a') + p (m - a) / m
 //! (2) rgba16f          u + p (1 - a)                a clamped to 0..1; p where it is 0
 //! ```
 //!
-//! In (1) colour above alpha is cut, as it would not be premultiplied; so nothing overflows. In (2) it
-//! may be above, where the interface is brighter than white; the sum is exact before it is rounded to
-//! a half (ties to even) and clamped to the largest finite one. Both leave the picture where alpha is 0
-//! and show the plane where it is full, bit for bit.
+//! In (1) colour above alpha is cut, as it would not be premultiplied; so nothing overflows. In (2)
+//! it may be above, where the interface is brighter than white; the sum is exact before it is
+//! rounded to a half (ties to even) and clamped to the largest finite one. Both leave the picture
+//! where alpha is 0 and show the plane where it is full, bit for bit.
 //!
 //! Exactness: `Exact`. Integers; each pixel for itself.
 

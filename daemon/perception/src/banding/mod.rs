@@ -1,14 +1,15 @@
-//! Banding: how likely a viewer sees the steps of a quantised gradient, and how many bits hide them.
+//! Banding: how likely a viewer sees the steps of a quantised gradient, and how many bits hide
+//! them.
 //!
 //! Denes 2020, chapter 6. The error between a gradient and its steps is a saw-tooth; each of its
 //! first sixteen harmonics is a grating, seen with the sensitivity to its frequency, and harmonics
 //! and channels add up as independent detectors. The gradient is smooth and nothing masks it: the
 //! worst case.
 //!
-//! Two things differ from the text. Its chromatic contrasts (6.11) have a free variable that it does
-//! not print, so that contrast and sensitivity of colour come together from the published model in
-//! [`crate::sensitivity::chromatic`]. And harmonics beyond the display's Nyquist frequency are left
-//! out, because no pixels show them.
+//! Two things differ from the text. Its chromatic contrasts (6.11) have a free variable that it
+//! does not print, so that contrast and sensitivity of colour come together from the published
+//! model in [`crate::sensitivity::chromatic`]. And harmonics beyond the display's Nyquist frequency
+//! are left out, because no pixels show them.
 
 mod gradient;
 

@@ -1,16 +1,18 @@
-//! Blur in in-between frames, made up for in the key, so that N frames give the light of N originals.
+//! Blur in in-between frames, made up for in the key, so that N frames give the light of N
+//! originals.
 //!
 //! Didyk et al. 2010, sections 5.1 and 6. The paper prints the compensation for a gamma; what it
-//! rests on is that light adds up over the fusion window, so here the identity is held in light, for
-//! any display: `N l(original) = l(key) + (N - 1) l(in-between)`. [`LightTable`] holds the light of
-//! each level as integers and [`Compensation`] splits with them: one input gives one output.
+//! rests on is that light adds up over the fusion window, so here the identity is held in light,
+//! for any display: `N l(original) = l(key) + (N - 1) l(in-between)`. [`LightTable`] holds the
+//! light of each level as integers and [`Compensation`] splits with them: one input gives one
+//! output.
 //!
 //! What the key cannot show goes back to the in-between frames, both ways. The paper keeps the
 //! original in the in-between frames where it is darker than its blur; giving them exactly what the
 //! key cannot take is less sharp there and loses no light.
 //!
-//! Key and in-between frames may be kept from differing by more than a given light: then the blur is
-//! what gives way, and the light of all frames stays as it is.
+//! Key and in-between frames may be kept from differing by more than a given light: then the blur
+//! is what gives way, and the light of all frames stays as it is.
 
 mod light_table;
 
@@ -147,8 +149,8 @@ fn rounded(dividend: u32, divisor: u32) -> u32 {
 }
 
 /// The same in real numbers: light of the key and of each in-between frame, shares of full light of
-/// 0 to 1, for `frames` frames of `original` light where the in-between frames get `blurred` if they
-/// can. The sum is exact.
+/// 0 to 1, for `frames` frames of `original` light where the in-between frames get `blurred` if
+/// they can. The sum is exact.
 #[must_use]
 pub fn split_light(original: f64, blurred: f64, frames: u32) -> [f64; 2] {
     let others = f64::from(frames) - 1.0;

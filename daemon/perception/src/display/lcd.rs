@@ -143,7 +143,8 @@ mod tests {
                 let pair = model.merged(channel, 0.2, 0.9);
                 assert!((pair - model.merged(channel, 0.9, 0.2)).abs() < 1e-15);
                 for code in levels() {
-                    // The fit is least squares over all pairs; on the diagonal it is off by this much.
+                    // The fit is least squares over all pairs; on the diagonal it is off by this
+                    // much.
                     let merged = model.merged(channel, code, code);
                     assert!((merged - code).abs() < 0.08, "{code} merges to {merged}");
                 }

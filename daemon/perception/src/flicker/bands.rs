@@ -23,7 +23,8 @@ pub struct Bands {
 }
 
 impl Bands {
-    /// The frequencies of the bands at `ppd` pixels per degree, cpd: 26, 13, 6.5, 3.25, 1.625 at 52.
+    /// The frequencies of the bands at `ppd` pixels per degree, cpd: 26, 13, 6.5, 3.25, 1.625 at
+    /// 52.
     pub fn frequencies(ppd: f64) -> impl Iterator<Item = f64> {
         let mut next = Some(ppd / 2.0);
         core::iter::from_fn(move || {

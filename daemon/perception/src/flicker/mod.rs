@@ -76,9 +76,9 @@ impl FlickerModel {
         probability(contrast * seen, SLOPE)
     }
 
-    /// The largest difference of luminance, cd/m2, between frames that fewer than half of the viewers
-    /// see, whatever the luminance around which they alternate, where each band of the difference
-    /// has at most the share `gain(cpd)` of it, 0 to 1.
+    /// The largest difference of luminance, cd/m2, between frames that fewer than half of the
+    /// viewers see, whatever the luminance around which they alternate, where each band of the
+    /// difference has at most the share `gain(cpd)` of it, 0 to 1.
     ///
     /// The mean of two frames is at least half of their difference, and sensitivity grows more
     /// slowly than luminance, so that a difference is seen best at that mean, with a contrast of 1.

@@ -1,8 +1,8 @@
 //! Down to a smaller frame and up again: D and U of Denes 2020, equations 5.1 and 5.2.
 //!
 //! D is a Gaussian and reading at the smaller frame's pixel centres, U is bilinear. Both work on
-//! light to the power of 1 over a gamma, where blur is about as visible in dark as in bright regions
-//! (section 5.2.2).
+//! light to the power of 1 over a gamma, where blur is about as visible in dark as in bright
+//! regions (section 5.2.2).
 
 use super::SIGMA_PX;
 use crate::PerceptionError;

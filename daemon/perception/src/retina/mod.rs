@@ -3,7 +3,8 @@
 //! Didyk et al. 2010 and Lee and Didyk 2018, equations 1 to 4: the eye adds up light over a short
 //! window while its gaze moves, so that a receptor sees a path through the frames. Frames are made
 //! of square pixels of even light, and a path is straight, so that its integral is a sum over the
-//! pixels it crosses, and exact. Light adds up as is (Talbot and Plateau): planes hold linear light.
+//! pixels it crosses, and exact. Light adds up as is (Talbot and Plateau): planes hold linear
+//! light.
 //!
 //! Hold-type blur, ghosts of repeated frames and the effect of low persistence all come out of this
 //! sum; none of them is put in. Pursuit that is not perfect adds blur along the motion (Denes 2020,

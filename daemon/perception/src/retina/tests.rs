@@ -92,7 +92,8 @@ fn the_convolution_of_equation_7_is_the_integral_for_whole_steps() {
     let lit: Vec<_> = lit_frames(&frames, rate, 1.0).collect();
     let image = retinal_image(&lit, 0.0, 3.0 / rate, |_, _| [step * rate, 0.0]).unwrap();
     for x in 24..WIDTH - 24 {
-        // In the middle of the window, 1.5 frames in, the path of frame k starts 4 (k - 1.5) px off.
+        // In the middle of the window, 1.5 frames in, the path of frame k starts 4 (k - 1.5) px
+        // off.
         let mut sum = 0.0;
         for (index, frame) in frames.iter().enumerate() {
             let first = x as f64 + 0.5 + step * (index as f64 - 1.5);

@@ -67,8 +67,8 @@ impl Window {
         }
     }
 
-    /// Hands `frame` to the display, to be shown at `planned`; false if it cannot take one. Its fate
-    /// comes as an event, where the display tells of it.
+    /// Hands `frame` to the display, to be shown at `planned`; false if it cannot take one. Its
+    /// fate comes as an event, where the display tells of it.
     pub fn present(&mut self, planned: MonoTime, frame: &ColorPlane) -> bool {
         if self.shared.is_closed() {
             return false;

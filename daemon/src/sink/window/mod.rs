@@ -7,9 +7,10 @@
 //! ([`software`]) it leaves it to a thread that paints. What happens to a window and to its frames
 //! comes as [`WindowEvent`]s, and each wakes the stream.
 //!
-//! What a display lacks is done without, and named ([`Feedback`]): without presentation feedback, or
-//! with one that never answers, frames are paced by frame callbacks, and without those by a timer
-//! at the announced rate. A display that is gone leaves the daemon and its streams as they are.
+//! What a display lacks is done without, and named ([`Feedback`]): without presentation feedback,
+//! or with one that never answers, frames are paced by frame callbacks, and without those by a
+//! timer at the announced rate. A display that is gone leaves the daemon and its streams as they
+//! are.
 
 mod handle;
 mod placement;

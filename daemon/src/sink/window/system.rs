@@ -2,7 +2,8 @@
 //!
 //! winit allows one event loop per process, and it may wait for the display without a limit. So it
 //! has a thread of its own, the others ask it by messages, and whoever waits for an answer does so
-//! for a limited time. When the display goes, or anything in that thread panics, all windows are told.
+//! for a limited time. When the display goes, or anything in that thread panics, all windows are
+//! told.
 
 use std::collections::BTreeMap;
 use std::fmt;

@@ -43,7 +43,8 @@ pub struct Args {
     #[arg(long, value_name = "P", default_value_t = 0.0)]
     #[arg(value_parser = number(0.0, 100.0), allow_negative_numbers = true)]
     arrival_jitter_percent: f64,
-    /// Content times of keys are off by up to this share of the key interval, plus or minus, 0 to 100.
+    /// Content times of keys are off by up to this share of the key interval, plus or minus, 0 to
+    /// 100.
     #[arg(long, value_name = "P", default_value_t = 0.0)]
     #[arg(value_parser = number(0.0, 100.0), allow_negative_numbers = true)]
     content_jitter_percent: f64,

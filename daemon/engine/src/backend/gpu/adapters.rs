@@ -51,7 +51,8 @@ impl GpuAdapter {
         Self { facts, adapter }
     }
 
-    /// What a device is opened with: what the kernels need, and planes as large as the adapter takes.
+    /// What a device is opened with: what the kernels need, and planes as large as the adapter
+    /// takes.
     pub(super) fn limits(&self) -> wgpu::Limits {
         let offered = self.adapter.limits();
         wgpu::Limits {

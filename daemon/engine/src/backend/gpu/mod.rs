@@ -1,8 +1,8 @@
 //! The GPU backend: the kernels of [`crate::kernels`] as WGSL on a wgpu device.
 //!
 //! A key's planes go up once, from the engine's private copy, the field before colour: the device
-//! derives what the scatter reads while the CPU still copies colour. Nothing waits for an upload; it
-//! runs on the device while the engine goes on. A frame is one submission: its dispatches, and a
+//! derives what the scatter reads while the CPU still copies colour. Nothing waits for an upload;
+//! it runs on the device while the engine goes on. A frame is one submission: its dispatches, and a
 //! copy to memory that the CPU reads. Buffers are kept from key to key; they grow and never shrink.
 //!
 //! Every picture is the same, byte for byte, as the CPU's. Whatever a driver does ends in a

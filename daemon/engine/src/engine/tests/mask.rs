@@ -28,8 +28,8 @@ fn mask(code: u8, size: u32) -> Vec<u8> {
     (0..size * size).map(|i| if at(i) { code } else { 0 }).collect()
 }
 
-/// What `method` shows half a key interval after keys whose patch moves 4 pixels each, with vectors of
-/// `vector` there and none elsewhere; `mask` has its size.
+/// What `method` shows half a key interval after keys whose patch moves 4 pixels each, with vectors
+/// of `vector` there and none elsewhere; `mask` has its size.
 fn shown(method: Method, vector: f32, mask: Option<(&[u8], u32)>) -> Vec<u8> {
     let format = StreamFormat { width: SIDE, height: SIDE, ..format() };
     let mut engine = Engine::new(format, EngineConfig::new(method, NonZeroUsize::MIN));

@@ -1,8 +1,8 @@
 //! Eight `rgba8` pixels at a time.
 //!
-//! Of in-between frames most pixels lie within the room of their sixteenth, where (2) of [`super`] is
-//! the blur itself; where one of eight does not, and for keys where a pixel differs from its blur,
-//! the tables are looked up. The caller asks the processor whether it has AVX2.
+//! Of in-between frames most pixels lie within the room of their sixteenth, where (2) of [`super`]
+//! is the blur itself; where one of eight does not, and for keys where a pixel differs from its
+//! blur, the tables are looked up. The caller asks the processor whether it has AVX2.
 
 use std::arch::x86_64::{
     __m256i, _mm_setr_epi8, _mm256_and_si256, _mm256_andnot_si256, _mm256_broadcastsi128_si256,

@@ -86,8 +86,8 @@ fn channels<T: Wide>(
     );
 }
 
-/// Calls `inside(sums, pixels)` for every row of the part `valid` of `picture`, with the sums of the row
-/// of `smooth` that lies there.
+/// Calls `inside(sums, pixels)` for every row of the part `valid` of `picture`, with the sums of
+/// the row of `smooth` that lies there.
 fn for_each_valid_row<T: Wide>(
     pool: &ThreadPool,
     valid: Rect,

@@ -91,8 +91,8 @@ fn down<T: Wide>(pool: &ThreadPool, fine: &Plane<T>, valid: Rect, coarse: &mut P
     );
 }
 
-/// Sums of a row of `width` columns, one more before it and [`BEHIND`] more behind it. Returns where
-/// the columns are.
+/// Sums of a row of `width` columns, one more before it and [`BEHIND`] more behind it. Returns
+/// where the columns are.
 #[inline(always)]
 fn with_borders<L: Lanes>(sums: &mut Vec<L>, width: usize) -> Range<usize> {
     sums.resize(1 + width + BEHIND, L::default());

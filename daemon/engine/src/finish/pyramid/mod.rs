@@ -13,9 +13,9 @@
 //!
 //! The blur is up(smooth), which [`super::compensate`] makes as it goes. (1) is the 3-tap binomial
 //! pyramid of Didyk et al. 2010, section 6; (3) is the subdivision of the cubic B-spline (Lane and
-//! Riesenfeld 1980), which takes the place of a tri-cubic read. The whole has the standard deviation
-//! of [`SIGMA_PX`]: 0.5 + 2 px^2 on the way down, 4 + 1 on the way up. Weights add up to a power of
-//! two, so that a flat picture comes back. Exactness: `Exact`.
+//! Riesenfeld 1980), which takes the place of a tri-cubic read. The whole has the standard
+//! deviation of [`SIGMA_PX`]: 0.5 + 2 px^2 on the way down, 4 + 1 on the way up. Weights add up to
+//! a power of two, so that a flat picture comes back. Exactness: `Exact`.
 
 mod cpu;
 mod gpu;

@@ -1,5 +1,6 @@
-//! The simulated display: a drifting grid of refreshes, some of which it skips, or none at all, that
-//! shows the newest frame handed over in time, and feedback that comes late, noisy, wrong or never.
+//! The simulated display: a drifting grid of refreshes, some of which it skips, or none at all,
+//! that shows the newest frame handed over in time, and feedback that comes late, noisy, wrong or
+//! never.
 
 use super::rng::SplitMix64;
 use crate::pacing::RefreshKind;

@@ -2,11 +2,11 @@
 //!
 //! *Missed* is a started picture that was not shown at its planned refresh (within half a refresh
 //! interval), whoever planned it. *Present error* is how far from its planned instant a picture was
-//! shown, either way. Content judder is the standard deviation, over all refreshes between the first
-//! and the last picture, of the advance of content time from one refresh to the next, in refresh
-//! intervals: a refresh that repeats a picture counts with an advance of zero. A variable display
-//! has no refreshes to count; there it is the deviation of that advance from the time that passed
-//! between two pictures, in shortest intervals.
+//! shown, either way. Content judder is the standard deviation, over all refreshes between the
+//! first and the last picture, of the advance of content time from one refresh to the next, in
+//! refresh intervals: a refresh that repeats a picture counts with an advance of zero. A variable
+//! display has no refreshes to count; there it is the deviation of that advance from the time that
+//! passed between two pictures, in shortest intervals.
 
 use crate::pacing::{PacerStatus, RefreshKind};
 use crate::time::{MonoSpan, MonoTime};

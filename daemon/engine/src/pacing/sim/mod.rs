@@ -3,8 +3,8 @@
 //! [`Scenario`] says how keys come ([`KeyScript`]), what the display does ([`DisplayScript`]) and
 //! how long synthesis takes ([`WorkScript`]); [`simulate`] runs a [`Policy`] through it, event by
 //! event, and measures what was seen on the display ([`SimReport`]). Time is computed, chance comes
-//! from a seed: one scenario gives one report, on every machine. [`TRACES`] are the scenarios of the
-//! published table, and [`Policy::COMPARED`] the pacers that ours is compared with.
+//! from a seed: one scenario gives one report, on every machine. [`TRACES`] are the scenarios of
+//! the published table, and [`Policy::COMPARED`] the pacers that ours is compared with.
 
 mod compared;
 mod display;

@@ -47,8 +47,8 @@ impl Policy {
     }
 }
 
-/// A pacer at work: it is told what happens, and says what to do next. What a pacer does not want to
-/// know it leaves out.
+/// A pacer at work: it is told what happens, and says what to do next. What a pacer does not want
+/// to know it leaves out.
 pub(super) trait Planner {
     /// A key has arrived.
     fn on_key(&mut self, content_time: MonoTime, arrived_at: MonoTime);

@@ -1,4 +1,5 @@
-//! The event loop: keys arrive, feedback arrives, the display refreshes, work ends, the pacer wakes.
+//! The event loop: keys arrive, feedback arrives, the display refreshes, work ends, the pacer
+//! wakes.
 
 use std::collections::BTreeMap;
 

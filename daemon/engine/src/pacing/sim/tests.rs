@@ -139,8 +139,8 @@ fn on_every_trace_content_never_runs_back_and_no_picture_waits_behind_another() 
         let scenario = trace.scenario(MonoSpan::from_ms(30_000), 1);
         let ours = simulate(&scenario, trace.pacer());
         assert_eq!(ours.backward_steps, 0, "{}", trace.name);
-        // A display that needs a refresh more, or most of one, has one picture more under way; of one
-        // that does not answer nobody knows when it has taken a picture.
+        // A display that needs a refresh more, or most of one, has one picture more under way; of
+        // one that does not answer nobody knows when it has taken a picture.
         let needs_long = scenario.display.latch > MonoSpan::from_ms(1);
         let under_way = usize::from(scenario.display.depth) + usize::from(needs_long);
         if scenario.display.feedback_lost_per_mille < 1_000 {

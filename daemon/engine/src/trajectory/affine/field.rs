@@ -37,7 +37,8 @@ impl AffineField {
         self.is_fitted.data_mut().fill(false);
     }
 
-    /// Fits the runs of eight points that are `wanted`, by number and row, and have not been fitted.
+    /// Fits the runs of eight points that are `wanted`, by number and row, and have not been
+    /// fitted.
     pub fn fit(
         &mut self,
         pool: &ThreadPool,
@@ -90,8 +91,8 @@ impl AffineField {
         row[(column / LANES as u32) as usize][column as usize % LANES]
     }
 
-    /// (3) of a cell of depth key `depth` and motion `d`, by the fit of its own lattice point alone.
-    /// None where that does not explain its motion.
+    /// (3) of a cell of depth key `depth` and motion `d`, by the fit of its own lattice point
+    /// alone. None where that does not explain its motion.
     #[must_use]
     #[inline(always)]
     pub fn curve_by_own(

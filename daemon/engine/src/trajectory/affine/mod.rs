@@ -1,7 +1,7 @@
 //! The `affine` rung: the local affine map of the motion field, continued as its own power.
 //!
-//! Around a point x of a surface the field is D(x + e) = D + J e. It takes where the surface was one
-//! span ago to where it is; relative to x,
+//! Around a point x of a surface the field is D(x + e) = D + J e. It takes where the surface was
+//! one span ago to where it is; relative to x,
 //!
 //! ```text
 //! (1) G(z) = A z + A D             A = (I - J)^-1
@@ -15,8 +15,8 @@
 //! ```
 //!
 //! A turn stays a turn, a zoom a zoom and a shear a shear, whatever the phase; a point of a turning
-//! wheel keeps to its circle. (2): the square root of a 2x2 matrix, by Cayley and Hamilton; it needs
-//! nothing but square roots, which IEEE 754 fixes to the bit.
+//! wheel keeps to its circle. (2): the square root of a 2x2 matrix, by Cayley and Hamilton; it
+//! needs nothing but square roots, which IEEE 754 fixes to the bit.
 //!
 //! Both are linear in D, so that what J makes of it is worked out once per lattice point: [`fit`]
 //! finds J there, eight points at a time and only where it is wanted; each cell takes the mean of

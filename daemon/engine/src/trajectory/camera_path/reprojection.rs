@@ -81,8 +81,8 @@ impl Reprojection {
         rows.iter().all(|row| row.is_finite()).then_some(Self { rows })
     }
 
-    /// Where the point seen at pixel (`x`, `y`) at inverse distance `q` lies; NaN where it is not in
-    /// front of the camera.
+    /// Where the point seen at pixel (`x`, `y`) at inverse distance `q` lies; NaN where it is not
+    /// in front of the camera.
     #[must_use]
     #[inline(always)]
     pub fn place(&self, at: [f32; 2], q: f32) -> [f32; 2] {

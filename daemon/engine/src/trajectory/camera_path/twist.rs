@@ -1,7 +1,7 @@
 //! Rigid motions and their logarithms: twists.
 //!
-//! A twist (w, u) is the constant rate of turn and drift, in the moving frame, that leads to a rigid
-//! motion (R, t) in one unit of time. With `[w]` the cross product with w and th = |w|:
+//! A twist (w, u) is the constant rate of turn and drift, in the moving frame, that leads to a
+//! rigid motion (R, t) in one unit of time. With `[w]` the cross product with w and th = |w|:
 //!
 //! ```text
 //! (1) exp: R = I + A [w] + B [w]^2,  t = (I + B [w] + C [w]^2) u

@@ -6,8 +6,8 @@ use super::luma::Level;
 use super::search::Block;
 use crate::plane::Plane;
 
-/// Steps of luma that every pixel of a block may differ by without anything having moved: dither, noise,
-/// the rounding of an encoder.
+/// Steps of luma that every pixel of a block may differ by without anything having moved: dither,
+/// noise, the rounding of an encoder.
 pub(super) const NOISE: u32 = 2 * 64;
 /// Part of what standing still leaves of (1) that may be left, in quarters.
 const WORTH_QUARTERS: u32 = 3;
@@ -41,8 +41,8 @@ pub(super) fn believe(now: &Level, at: [i32; 2], step: Step, error: u32, still: 
     Block { step, belief }
 }
 
-/// Whether at least half of the blocks that can tell are explained: two pictures of different places
-/// have hardly any in common.
+/// Whether at least half of the blocks that can tell are explained: two pictures of different
+/// places have hardly any in common.
 pub(super) fn is_believable(blocks: &Plane<Block>) -> bool {
     let count = |belief: Belief| blocks.data().iter().filter(|b| b.belief == belief).count();
     count(Belief::Unexplained) <= count(Belief::Explained) + count(Belief::Flat)

@@ -1,8 +1,8 @@
 //! From blocks to cells: what a cell of 4x4 pixels takes of the blocks around it.
 //!
 //! Where they agree to a pixel, it takes their mean, weighted by how near they are: a surface moves
-//! smoothly. Where they do not, an outline runs between them, and the cell takes that motion, or none,
-//! by which the 8x8 pixels around it are explained best; that of its own block among equals.
+//! smoothly. Where they do not, an outline runs between them, and the cell takes that motion, or
+//! none, by which the 8x8 pixels around it are explained best; that of its own block among equals.
 
 use rayon::ThreadPool;
 

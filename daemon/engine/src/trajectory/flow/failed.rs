@@ -1,8 +1,8 @@
 //! Where a key's own motion does not explain its picture, and flow does.
 //!
-//! A block of the key is looked at by the motion of the cells at its centre and near its corners first:
-//! most are explained by one of them. What is not is looked at pixel by pixel ([`own`]), by the motion of
-//! each and but for those that were hidden before, as outlines may run through it:
+//! A block of the key is looked at by the motion of the cells at its centre and near its corners
+//! first: most are explained by one of them. What is not is looked at pixel by pixel ([`own`]), by
+//! the motion of each and but for those that were hidden before, as outlines may run through it:
 //!
 //! ```text
 //! (5) failed    where SAD(D) > NOISE + contrast / 4
@@ -49,8 +49,8 @@ impl FailedField {
         self.blocks.data().is_empty()
     }
 
-    /// The flow at a place, pixels: newer minus older position. None where the key's motion explains
-    /// the picture, or flow does not.
+    /// The flow at a place, pixels: newer minus older position. None where the key's motion
+    /// explains the picture, or flow does not.
     #[must_use]
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "clamped to the picture")]

@@ -37,8 +37,8 @@ impl Level {
         (block * BLOCK).min(self.size[axis] - BLOCK).cast_signed()
     }
 
-    /// Whether a block from (`x`, `y`) on, and one pixel around it, lies within the margin, and half
-    /// of it or more in the picture.
+    /// Whether a block from (`x`, `y`) on, and one pixel around it, lies within the margin, and
+    /// half of it or more in the picture.
     #[inline(always)]
     pub(super) fn has_block(&self, [x, y]: [i32; 2]) -> bool {
         let half = (BLOCK / 2).cast_signed();
@@ -134,7 +134,8 @@ pub(super) struct Pyramid {
 }
 
 impl Pyramid {
-    /// Makes the finest of these that of `key`, whose valid rectangle is at least two blocks in size.
+    /// Makes the finest of these that of `key`, whose valid rectangle is at least two blocks in
+    /// size.
     pub(super) fn update(&mut self, pool: &ThreadPool, key: &KeyFrame) {
         self.levels.resize_with(HALVINGS + 1, Level::default);
         let finest = &mut self.levels[0];

@@ -1,7 +1,7 @@
 //! Block flow: motion estimated from the pictures of the two newest keys, and from nothing else.
 //!
-//! For a block of 8x8 pixels of the newest key at x, the displacement D for which the older key shows
-//! the same at x - D. Luma in 8 bits, found coarse to fine ([`search`]):
+//! For a block of 8x8 pixels of the newest key at x, the displacement D for which the older key
+//! shows the same at x - D. Luma in 8 bits, found coarse to fine ([`search`]):
 //!
 //! ```text
 //! (1) SAD(D)  = sum over the block of |L(x) - L'(x - D)|
@@ -13,9 +13,10 @@
 //! surroundings. It is believed only where it explains the block, so that whoever goes by it is
 //! hardly ever worse off than with a picture that stands still ([`believe`]).
 //!
-//! Where a key has no motion the answer is given on cells of 4x4 pixels, each with the motion of that
-//! block around it that fits it best. Where it has, only those blocks are searched that its own motion
-//! fails to explain ([`failed`]): what moves over a surface, or is seen in it. Integers alone, every block for itself: the number of threads changes nothing.
+//! Where a key has no motion the answer is given on cells of 4x4 pixels, each with the motion of
+//! that block around it that fits it best. Where it has, only those blocks are searched that its
+//! own motion fails to explain ([`failed`]): what moves over a surface, or is seen in it. Integers
+//! alone, every block for itself: the number of threads changes nothing.
 
 mod believe;
 mod block;
@@ -65,8 +66,9 @@ pub struct Flow {
 }
 
 impl Flow {
-    /// Finds how the picture of `newest` moved since `older`, the key before it. Returns false where
-    /// the two cannot be compared, or have too little in common to tell: nothing is known then.
+    /// Finds how the picture of `newest` moved since `older`, the key before it. Returns false
+    /// where the two cannot be compared, or have too little in common to tell: nothing is known
+    /// then.
     pub fn find(&mut self, pool: &ThreadPool, newest: &KeyFrame, older: &KeyFrame) -> bool {
         if !self.take_pictures(pool, newest, older) {
             return false;
@@ -82,8 +84,8 @@ impl Flow {
         true
     }
 
-    /// Finds in `found` where the motion of `newest`, which points back to `older`, does not explain its
-    /// picture, and what does. Little work where it does everywhere.
+    /// Finds in `found` where the motion of `newest`, which points back to `older`, does not
+    /// explain its picture, and what does. Little work where it does everywhere.
     pub fn find_failed(
         &mut self,
         pool: &ThreadPool,
@@ -132,8 +134,8 @@ impl Flow {
         true
     }
 
-    /// Fills `displacement`, a field of `cells` (columns, rows) that share the picture out evenly, with
-    /// what was found last: newer minus older position, pixels.
+    /// Fills `displacement`, a field of `cells` (columns, rows) that share the picture out evenly,
+    /// with what was found last: newer minus older position, pixels.
     pub fn fill(&self, cells: [u32; 2], displacement: &mut Plane<[f32; 2]>) {
         let found = self.cells.field();
         let size = [found.width(), found.height()];

@@ -1,8 +1,8 @@
 //! Coarse to fine: (2) and (3) of [`super`].
 //!
-//! The coarsest level is searched in full, every finer one around what the four coarser blocks next to
-//! a block found, and around standing still. A second pass over each level lets every block take what
-//! its neighbours found in the first, where that costs less.
+//! The coarsest level is searched in full, every finer one around what the four coarser blocks next
+//! to a block found, and around standing still. A second pass over each level lets every block take
+//! what its neighbours found in the first, where that costs less.
 
 use rayon::ThreadPool;
 
@@ -16,8 +16,8 @@ use crate::plane::Plane;
 
 /// Pixels of the coarsest level that it is searched for, to either side.
 const REACH: i16 = 4;
-/// SMOOTH of (2), steps of luma per pixel: noise of a step or two in every pixel of a block changes (1)
-/// by about as much, and does not make blocks of one surface go apart.
+/// SMOOTH of (2), steps of luma per pixel: noise of a step or two in every pixel of a block changes
+/// (1) by about as much, and does not make blocks of one surface go apart.
 const SMOOTH: u32 = 4;
 /// Moves to a neighbouring place that costs less, at most.
 const MOVES: usize = 3;
@@ -43,8 +43,8 @@ pub(super) struct Block {
 }
 
 impl Search {
-    /// Finds where every block of `now` was in `then`, which has its size, to a whole pixel. `wanted`
-    /// says which blocks of each level, the finest first; the others count as still.
+    /// Finds where every block of `now` was in `then`, which has its size, to a whole pixel.
+    /// `wanted` says which blocks of each level, the finest first; the others count as still.
     pub(super) fn find(
         &mut self,
         pool: &ThreadPool,

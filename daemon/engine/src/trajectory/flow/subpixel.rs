@@ -7,8 +7,8 @@
 //! (4) (sum g g^T + DAMPING) e = sum g r        D <- D + e
 //! ```
 //!
-//! Damped, so that along an edge, where e is anybody's guess, it stays what it was. A step that leaves
-//! more of (1) is not taken.
+//! Damped, so that along an edge, where e is anybody's guess, it stays what it was. A step that
+//! leaves more of (1) is not taken.
 
 use super::luma::Level;
 use super::own::{Mask, in_any_light};
@@ -16,7 +16,8 @@ use super::{BLOCK, PER_PX, Step};
 
 /// Steps of (4).
 const ITERATIONS: usize = 3;
-/// DAMPING of (4): that of a difference of four steps of luma over every pixel, which noise may make.
+/// DAMPING of (4): that of a difference of four steps of luma over every pixel, which noise may
+/// make.
 const DAMPING: i64 = 64 * 16;
 /// Least of D to a side in one step, and farthest away from where it began, Q8 pixels.
 const MOST: i32 = 256;
@@ -82,13 +83,15 @@ fn error(r: &[[i32; SIDE]; SIDE]) -> u32 {
     r.as_flattened().iter().map(|r| r.unsigned_abs()).sum::<u32>() >> 4
 }
 
-/// What `step`, which [`refine`] found, leaves of (1), without the mean, where the block at `at` counts.
+/// What `step`, which [`refine`] found, leaves of (1), without the mean, where the block at `at`
+/// counts.
 pub(super) fn error_of([now, then]: [&Level; 2], at: [i32; 2], step: Step, counts: &Mask) -> u32 {
     let r = Template::new(now, at).residual(then, at, step.map(|d| i32::from(d) * Q8_STEP));
     in_any_light(&r, counts)
 }
 
-/// Takes the block at `at` from `step` whole pixels on to 1/32 pixels, and says what of (1) is left.
+/// Takes the block at `at` from `step` whole pixels on to 1/32 pixels, and says what of (1) is
+/// left.
 pub(super) fn refine([now, then]: [&Level; 2], at: [i32; 2], step: Step) -> (Step, u32) {
     let start = step.map(|d| i32::from(d) << 8);
     let template = Template::new(now, at);

@@ -38,7 +38,8 @@ fn found(threads: usize, older: &KeyFrame, newest: &KeyFrame) -> Option<Plane<[f
     })
 }
 
-/// How far cells at least `inside` of them away from the border are from `d`, pixels, the nearest first.
+/// How far cells at least `inside` of them away from the border are from `d`, pixels, the nearest
+/// first.
 fn errors(field: &Plane<[f32; 2]>, d: [f32; 2], inside: u32) -> Vec<f32> {
     let columns = inside..field.width() - inside;
     let cells = (inside..field.height() - inside)
@@ -160,7 +161,8 @@ fn failed(older: &KeyFrame, newest: &KeyFrame) -> FailedField {
     found
 }
 
-/// A screen at 40 to 104 by 40 to 88 whose picture has run `at` pixels to the right, in a still wall.
+/// A screen at 40 to 104 by 40 to 88 whose picture has run `at` pixels to the right, in a still
+/// wall.
 fn screen(at: f32) -> impl Fn(f32, f32) -> f32 {
     move |x, y| {
         let is_screen = (40.0..104.0).contains(&x) && (40.0..88.0).contains(&y);

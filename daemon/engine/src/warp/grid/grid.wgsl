@@ -1,9 +1,9 @@
-// The snapped grid from its mesh on, the twin of `mesh.rs` (advance), `triangle.rs` and `raster.rs`.
-// The mesh of a key is made on the CPU, once.
+// The snapped grid from its mesh on, the twin of `mesh.rs` (advance), `triangle.rs` and
+// `raster.rs`. The mesh of a key is made on the CPU, once.
 //
 // Where the CPU walks spans of bands, here eight invocations share the rows of a triangle and ask
-// every pixel of its bounding box; the pixels inside are the same. Two atomic passes, free of order,
-// choose the triangle of each pixel.
+// every pixel of its bounding box; the pixels inside are the same. Two atomic passes, free of
+// order, choose the triangle of each pixel.
 
 // Per vertex: x and y in 1/16 px, velocity, depth key.
 @group(0) @binding(3) var<storage, read> vertices: array<vec4<u32>>;

@@ -24,9 +24,9 @@
 //! therefore not drawn at all, disocclusions are stretched by construction, and where no
 //! triangle is turned over each pixel has exactly one candidate and (3) needs no depth.
 //!
-//! Exactness: `Exact`. Integers only, and (3) does not depend on the order of drawing. Phase 0 and zero motion
-//! give the key's bytes. Every quantity but one fits 32 bits: the texture gradient is one 64-bit
-//! quotient per triangle and axis, which a shader gets by shift and subtract.
+//! Exactness: `Exact`. Integers only, and (3) does not depend on the order of drawing. Phase 0 and
+//! zero motion give the key's bytes. Every quantity but one fits 32 bits: the texture gradient is
+//! one 64-bit quotient per triangle and axis, which a shader gets by shift and subtract.
 //!
 //! Departures from the paper:
 //! - the border vertices are a frame of their own around one free vertex per neighbourhood,

@@ -7,11 +7,11 @@
 //! motion, and the outline moves with what it outlines; what stretches is the farther surface
 //! behind it.
 //!
-//! An entry has 16 bits, as in Didyk et al. 2010, section 6: 6 bits of magnitude on a quarter-octave
-//! scale, 2 x 5 bits of position relative to the regular place of the vertex. Entries are ordered by
-//! magnitude, then nearness to that place, then position, so a maximum is unique and does not
-//! depend on the order of combining. Below 1/4 px per cell the magnitude is 0: a vertex in smooth
-//! motion stays where it is.
+//! An entry has 16 bits, as in Didyk et al. 2010, section 6: 6 bits of magnitude on a
+//! quarter-octave scale, 2 x 5 bits of position relative to the regular place of the vertex.
+//! Entries are ordered by magnitude, then nearness to that place, then position, so a maximum is
+//! unique and does not depend on the order of combining. Below 1/4 px per cell the magnitude is 0:
+//! a vertex in smooth motion stays where it is.
 
 use crate::key::Velocity;
 use crate::plane::{Plane, Rect};

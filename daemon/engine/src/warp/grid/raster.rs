@@ -1,9 +1,9 @@
 //! Draws the warped mesh, a band of target rows at a time.
 //!
 //! Bands are [`BAND`] rows whatever the number of threads, and what a pixel becomes depends on the
-//! triangles over it alone. Each band takes two passes, equation (3): the largest depth
-//! of every pixel, then, ascending by cell id, the first triangle within the tolerance of it. A band
-//! with no turned-over triangle has one candidate per pixel, (4), and skips the first.
+//! triangles over it alone. Each band takes two passes, equation (3): the largest depth of every
+//! pixel, then, ascending by cell id, the first triangle within the tolerance of it. A band with no
+//! turned-over triangle has one candidate per pixel, (4), and skips the first.
 
 use rayon::prelude::*;
 

@@ -1,5 +1,5 @@
-// What pixels of broken cells show, the twin of `broken.rs` and `fill.rs`, for shaders that read the
-// cells of a frame. Takes bindings 4 to 7: a shader's own begins at 8.
+// What pixels of broken cells show, the twin of `broken.rs` and `fill.rs`, for shaders that read
+// the cells of a frame. Takes bindings 4 to 7: a shader's own begins at 8.
 
 // Of the key, as the scatter read them.
 @group(0) @binding(4) var<storage, read> held: array<u32>;

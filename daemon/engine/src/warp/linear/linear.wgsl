@@ -1,4 +1,5 @@
-// The linear method at full resolution but for (4), the twin of `cpu.rs`, `between.rs` and `fill.rs`.
+// The linear method at full resolution but for (4), the twin of `cpu.rs`, `between.rs` and
+// `fill.rs`.
 
 // The cells that are broken.
 @group(0) @binding(8) var<storage, read> broken: ListedCells;
@@ -57,7 +58,8 @@ fn lerp(a: vec2<i32>, b: vec2<i32>, way: i32) -> vec2<i32> {
     return a + (((b - a) * way + 128) >> vec2<u32>(8u));
 }
 
-// Where in the key a pixel of a broken cell is read: (2), and where that finds nothing, (3) and (5).
+// Where in the key a pixel of a broken cell is read: (2), and where that finds nothing, (3) and
+// (5).
 fn broken_place(cell: vec2<u32>, p: vec2<i32>) -> vec2<i32> {
     let found = find_surface(cell, p);
     if found.is_there {

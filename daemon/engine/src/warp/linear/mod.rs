@@ -18,11 +18,12 @@
 //! (5) else          out(p) = key's pixel where the pixel of f closest to p came from
 //! ```
 //!
-//! (2) asks the key itself whether the surface of a candidate is what p would show: a field
-//! coarser than colour, the 2x2 footprint and dilation all reach farther than surfaces do. (3)
-//! continues the far surface under what used to hide it; where it is still hidden in the key, (4) shows
-//! what the key before saw of it, and where that saw nothing either, (5) stretches its last visible
-//! pixel. None reads between two pixels unless both are far, so a hole never shows the nearer surface.
+//! (2) asks the key itself whether the surface of a candidate is what p would show: a field coarser
+//! than colour, the 2x2 footprint and dilation all reach farther than surfaces do. (3) continues
+//! the far surface under what used to hide it; where it is still hidden in the key, (4) shows what
+//! the key before saw of it, and where that saw nothing either, (5) stretches its last visible
+//! pixel. None reads between two pixels unless both are far, so a hole never shows the nearer
+//! surface.
 //!
 //! Edges: reads are clamped to the valid rectangle; what comes in over the border is a hole.
 //! Phase 0 gives the key. Exactness: `Exact`.

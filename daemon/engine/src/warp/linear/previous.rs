@@ -5,9 +5,9 @@ use super::fill::{FarSurface, clamp, nearest_pixel};
 use crate::key::{KeyFrame, Velocity};
 use crate::plane::Plane;
 
-/// Depth keys of the far side in two keys may differ by this fraction (a shift of 5: 1/32). Of three
-/// captures one gains 0.4 dB from 1/8 to 1/32 and half of that at 1/64, and one loses 0.1 dB at 1/8
-/// and nothing at 1/32.
+/// Depth keys of the far side in two keys may differ by this fraction (a shift of 5: 1/32). Of
+/// three captures one gains 0.4 dB from 1/8 to 1/32 and half of that at 1/64, and one loses 0.1 dB
+/// at 1/8 and nothing at 1/32.
 pub const DEPTH_SHIFT: u32 = 5;
 
 /// What holes read of the key before, beside its colour.
@@ -18,8 +18,8 @@ pub(super) struct Previous<'a> {
     pub(super) came: &'a Plane<Velocity>,
 }
 
-/// Whether holes after `key` may show what `older`, the key before it, shows: its motion points back
-/// to it, and both have depth, motion and one geometry.
+/// Whether holes after `key` may show what `older`, the key before it, shows: its motion points
+/// back to it, and both have depth, motion and one geometry.
 #[must_use]
 pub fn has_previous(key: &KeyFrame, older: &KeyFrame) -> bool {
     let size = |key: &KeyFrame| {

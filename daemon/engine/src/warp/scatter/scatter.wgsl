@@ -1,6 +1,6 @@
-// Forward splat on the field grid in two passes, the twin of `one_by_one.rs`. Which invocation comes first
-// does not matter: the largest depth key and the smallest candidate are the same in any order.
-// Candidates are kept with every bit turned over, so that cleared memory is `NO_SOURCE`.
+// Forward splat on the field grid in two passes, the twin of `one_by_one.rs`. Which invocation
+// comes first does not matter: the largest depth key and the smallest candidate are the same in any
+// order. Candidates are kept with every bit turned over, so that cleared memory is `NO_SOURCE`.
 
 @group(0) @binding(1) var<storage, read> held: array<u32>;
 @group(0) @binding(2) var<storage, read> near: array<u32>;

@@ -16,7 +16,8 @@ use crate::field::FieldMap;
 use crate::phase::Phase;
 use crate::plane::Plane;
 
-/// Most source cells that a target cell looks at, on average. About as many take as long as a splat.
+/// Most source cells that a target cell looks at, on average. About as many take as long as a
+/// splat.
 const MOST_CANDIDATES: usize = 14;
 /// Most source cells that any target cell looks at: one thread works on a tile, and remembers what
 /// it found.

@@ -16,11 +16,11 @@
 //!     where that shows nothing nearer, else of the newest key at q1
 //! ```
 //!
-//! (2) is their (1.0) and (1.1) with the weights that the text below them describes: proportional to
-//! the area of intersection, falling with the distance of the voxel. The two areas are bilinear
+//! (2) is their (1.0) and (1.1) with the weights that the text below them describes: proportional
+//! to the area of intersection, falling with the distance of the voxel. The two areas are bilinear
 //! weights. (3) and (4) are ours: the paper does not say what a surface is made from that one key
-//! hides. Of the surfaces that come to one cell the nearest is shown; a cell whose neighbours do not
-//! move alike asks the newest key which of them it would show, as the linear method does.
+//! hides. Of the surfaces that come to one cell the nearest is shown; a cell whose neighbours do
+//! not move alike asks the newest key which of them it would show, as the linear method does.
 //!
 //! Their choice of the frame rate from global motion is not a matter of this kernel.
 //!

@@ -1,11 +1,11 @@
 //! What to ask a compositor for with each frame, by how it has answered so far.
 //!
 //! Requests for feedback cannot be taken back, and some compositors never say of a frame that they
-//! have shown it, or discard some and are silent about the others. So requests are counted, and with
-//! too many out none is added. Until the first frame was said to be shown, a frame callback goes with
-//! each: when those come and that word does not, callbacks take its place, and feedback is tried again
-//! now and then. A compositor that answers nothing is asked for one callback at a time, as a sign of
-//! life.
+//! have shown it, or discard some and are silent about the others. So requests are counted, and
+//! with too many out none is added. Until the first frame was said to be shown, a frame callback
+//! goes with each: when those come and that word does not, callbacks take its place, and feedback
+//! is tried again now and then. A compositor that answers nothing is asked for one callback at a
+//! time, as a sign of life.
 
 use crate::sink::window::Feedback;
 
@@ -13,8 +13,8 @@ use crate::sink::window::Feedback;
 const MOST_FEEDBACKS: u32 = 60;
 /// Frame callbacks that may be out. They come one refresh after the other where they come at all.
 const MOST_CALLBACKS: u32 = 12;
-/// Callbacks without a frame that was said to be shown, after which that is not expected. Fewer than
-/// the discarded frames in a row that would make the window one that nobody sees.
+/// Callbacks without a frame that was said to be shown, after which that is not expected. Fewer
+/// than the discarded frames in a row that would make the window one that nobody sees.
 const CALLBACKS_TO_GIVE_UP: u32 = 10;
 /// Frames without any answer, after which none is expected.
 const FRAMES_TO_GIVE_UP: u32 = 60;
@@ -130,8 +130,8 @@ impl Answers {
         change
     }
 
-    /// A frame was not shown, by the compositor's word; a good compositor says so of some, and a bad
-    /// one, too.
+    /// A frame was not shown, by the compositor's word; a good compositor says so of some, and a
+    /// bad one, too.
     pub(super) fn on_discarded(&mut self) {
         self.feedbacks = self.feedbacks.saturating_sub(1);
     }

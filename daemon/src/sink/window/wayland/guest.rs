@@ -1,8 +1,8 @@
 //! A guest on the desktop window's own Wayland connection: the only `unsafe` code of windows.
 //!
-//! Frames have to go to the surface that winit has made, which only pointers lead to. What keeps them
-//! valid is held here, in the order in which it has to go: our connection before the window, and the
-//! window before the display. A queue of a display that is gone would be a crash.
+//! Frames have to go to the surface that winit has made, which only pointers lead to. What keeps
+//! them valid is held here, in the order in which it has to go: our connection before the window,
+//! and the window before the display. A queue of a display that is gone would be a crash.
 
 use std::fmt;
 use std::sync::Arc;
@@ -50,14 +50,14 @@ impl Guest {
             return None;
         };
         let anchor = Anchor { _window: Arc::clone(window), _display: display.clone() };
-        // SAFETY: the pointer is a live `wl_display`, because winit says so of a handle that it lends,
-        // and stays one: `anchor` owns the display and is dropped after the connection, here and in
-        // every struct that takes this one apart.
+        // SAFETY: the pointer is a live `wl_display`, because winit says so of a handle that it
+        // lends, and stays one: `anchor` owns the display and is dropped after the connection, here
+        // and in every struct that takes this one apart.
         let backend = unsafe { Backend::from_foreign_display(raw_display.display.as_ptr().cast()) };
         let connection = Connection::from_backend(backend);
-        // SAFETY: the pointer is the live `wl_surface` of `window`, which `anchor` keeps. winit makes
-        // it with the same copy of `wayland-backend` (a test counts the copies), so that the id
-        // shares its mark of life and is refused, not followed, once the surface is gone.
+        // SAFETY: the pointer is the live `wl_surface` of `window`, which `anchor` keeps. winit
+        // makes it with the same copy of `wayland-backend` (a test counts the copies), so that the
+        // id shares its mark of life and is refused, not followed, once the surface is gone.
         let id = unsafe {
             ObjectId::from_ptr(WlSurface::interface(), raw_window.surface.as_ptr().cast())
         };

@@ -37,7 +37,8 @@ const STOP_POLL: Timespec = Timespec { tv_sec: 0, tv_nsec: 20_000_000 };
 const MODE_PERCENT: i64 = 2;
 /// So many answers in a row have to name another refresh interval to make a mode.
 const ANSWERS_TO_SWITCH: u32 = 4;
-/// A frame was shown within this time of hearing of it, or the compositor's clock is not what it says.
+/// A frame was shown within this time of hearing of it, or the compositor's clock is not what it
+/// says.
 const PLAUSIBLE: MonoSpan = MonoSpan::from_ms(1_000);
 
 /// The thread's own state, and what it shares with the stream's.
@@ -219,7 +220,8 @@ impl Dispatch<WlCallback, MonoTime> for Listener {
         if mode != Feedback::FrameCallbacks {
             return;
         }
-        // Frames that were replaced before they were drawn are told of together with the one that was.
+        // Frames that were replaced before they were drawn are told of together with the one that
+        // was.
         if let Some((replaced, _)) = state.drawn.replace((planned, clock::now())) {
             state.tell(Told::Discarded { planned: replaced });
         }

@@ -1,8 +1,8 @@
 //! Memory that the compositor reads pictures from: one file in memory, cut into buffers.
 //!
-//! A picture is written with `pwrite`, not through a mapping: the compositor has the file as well and
-//! could write to it, so no slice of it is formed. What lies around the picture is zero from the
-//! start and is never written.
+//! A picture is written with `pwrite`, not through a mapping: the compositor has the file as well
+//! and could write to it, so no slice of it is formed. What lies around the picture is zero from
+//! the start and is never written.
 
 use std::fs::File;
 use std::io;

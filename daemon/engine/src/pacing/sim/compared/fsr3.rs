@@ -3,8 +3,9 @@
 //!
 //! A frame is handed over at (the one before) + mean / n - 0.1 deviation - 0.1 ms, where n is the
 //! number of frames made of each key: 2 there, here what comes nearest to the refresh rate. Until
-//! there are ten samples, and after a gap of more than 100 ms, nothing is paced. The key goes first,
-//! for here it is extrapolated from. It aims at the instant of handing over, for it knows no other.
+//! there are ten samples, and after a gap of more than 100 ms, nothing is paced. The key goes
+//! first, for here it is extrapolated from. It aims at the instant of handing over, for it knows no
+//! other.
 
 use std::collections::VecDeque;
 
