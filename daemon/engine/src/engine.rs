@@ -266,7 +266,9 @@ impl Engine {
         }
         let has_none = key.motion_from.is_none() && !key.is_cut;
         let is_estimated = has_none && self.estimate_motion(&mut key);
-        self.follow_picture(&mut key);
+        if !is_estimated {
+            self.follow_picture(&mut key);
+        }
         let motion = match key.motion_from {
             _ if key.is_cut => MotionState::Cut,
             Some(_) if is_estimated => MotionState::Estimated,

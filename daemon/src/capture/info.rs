@@ -20,7 +20,7 @@ pub struct CaptureInfo {
     pub height: u32,
     /// From the first to the last content time of the first stream, seconds.
     pub duration_s: f64,
-    /// Frames that arrived and were not recorded.
+    /// Frames, or user interfaces between them, that arrived and were not recorded.
     pub gaps: u64,
     /// Where and why the file ends early, if it does.
     pub tail: Option<Damage>,

@@ -183,7 +183,7 @@ impl<S: ReadAt> Capture<S> {
         self.plane(number, &ui.entry, ui.stored)
     }
 
-    /// Frames that arrived and were not recorded.
+    /// Frames, or user interfaces between them, that arrived and were not recorded.
     #[must_use]
     pub fn gaps(&self) -> &[Gap] {
         &self.index.gaps

@@ -363,7 +363,10 @@ impl<'a, S: ReadAt> Walk<'a, S> {
         let Some(index) = self.streams.iter().position(|entry| entry.id == stream) else {
             return broken(data.at, "a stream that was described before", stream);
         };
-        let room = data.len.saturating_sub(ui_plane::LENGTH_BYTES).min(MAX_RECORD as u64);
+        if data.len < ui_plane::LENGTH_BYTES {
+            return broken(data.at, "a record and its length", format!("{} bytes", data.len));
+        }
+        let room = (data.len - ui_plane::LENGTH_BYTES).min(MAX_RECORD as u64);
         let length = self.window.array::<4>(data.at)?.map_or(0, u32::from_le_bytes);
         let length = u64::from(length);
         if length > room {

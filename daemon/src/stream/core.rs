@@ -351,9 +351,13 @@ impl StreamCore {
         if arrived_at >= self.ui.arrived_at {
             self.engine.set_ui(input)?;
             self.ui = NewestUi { arrived_at, taken: self.ui.taken + 1 };
-            self.pacer.on_news();
         }
         Ok(())
+    }
+
+    /// The next picture shows more than that things have moved on: see [`Pacer::on_news`].
+    pub fn on_news(&mut self) {
+        self.pacer.on_news();
     }
 
     /// The camera is at `view` by `content_time`: see [`Engine::late_camera`].

@@ -35,30 +35,25 @@ struct Window {
 }
 
 impl Hints {
-    /// For pictures of this size on a display with these refreshes; None where it is not known how
-    /// large they are to the eye, or the display is slower than any schedule.
+    /// For pictures of this size; None where it is not known how large they are to the eye.
     #[must_use]
-    pub fn new(
-        size_px: [u32; 2],
-        pixels_per_degree: Option<f32>,
-        refresh_interval: MonoSpan,
-    ) -> Option<Self> {
+    pub fn new(size_px: [u32; 2], pixels_per_degree: Option<f32>) -> Option<Self> {
         let display = ScheduleDisplay {
             size_px,
             width_deg: f64::from(size_px[0]) / f64::from(pixels_per_degree?),
-            max_refresh_hz: 1.0 / refresh_interval.as_secs_f64(),
+            max_refresh_hz: LEAST_REFRESH_HZ,
             persistence: 1.0,
         };
-        let is_fast = display.max_refresh_hz >= LEAST_REFRESH_HZ && display.check().is_ok();
-        is_fast.then_some(Self { display, window: None, told: None })
+        display.check().is_ok().then_some(Self { display, window: None, told: None })
     }
 
-    /// A key that shows `content_time` was rendered with so many `pixels`; `speed` says how fast
-    /// its picture moves, pixels per second. What to tell the client, without the number of its
-    /// stream.
+    /// A key that shows `content_time` was rendered with so many `pixels`, for a display with these
+    /// refreshes; `speed` says how fast its picture moves, pixels per second. What to tell the
+    /// client, without the number of its stream. Of a display slower than any schedule, nothing.
     pub fn on_key(
         &mut self,
         content_time: MonoTime,
+        refresh_interval: MonoSpan,
         pixels: u64,
         speed: impl FnOnce() -> Option<f32>,
     ) -> Option<Hint> {
@@ -79,6 +74,11 @@ impl Hints {
         #[expect(clippy::cast_precision_loss, reason = "pixels of a second have below 2^53")]
         let budget = window.pixels as f64 / covered.as_secs_f64();
         *window = begin;
+        // The pacer's estimate wavers by some ppm.
+        self.display.max_refresh_hz = (1e3 / refresh_interval.as_secs_f64()).round() / 1e3;
+        if self.display.max_refresh_hz < LEAST_REFRESH_HZ {
+            return None;
+        }
         let velocity = f64::from(speed()?) / self.display.ppd();
         let best = schedule(&self.display, budget, velocity, Motion::Predictable).ok()?;
         let differs = |a: f64, b: f64| (a / b - 1.0).abs() > NEWS;
@@ -111,13 +111,13 @@ mod tests {
     fn told(hints: &mut Hints, from_s: i64, keys_hz: i64, speed: f32) -> Vec<Hint> {
         let key = |i: i64| {
             let at = MonoTime::ZERO + MonoSpan::from_ms(1000 * from_s + 1000 * i / keys_hz);
-            hints.on_key(at, 1920 * 1080, || Some(speed))
+            hints.on_key(at, MonoSpan::from_hz(120.0), 1920 * 1080, || Some(speed))
         };
         (0..3 * keys_hz).filter_map(key).collect()
     }
 
     fn hints() -> Hints {
-        Hints::new(SIZE, Some(50.0), MonoSpan::from_hz(120.0)).unwrap()
+        Hints::new(SIZE, Some(50.0)).unwrap()
     }
 
     #[test]
@@ -145,15 +145,15 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_said_where_the_size_of_a_pixel_or_its_speed_is_not_known() {
-        let refresh = MonoSpan::from_hz(120.0);
-        assert!(Hints::new(SIZE, None, refresh).is_none());
-        assert!(Hints::new(SIZE, Some(50.0), MonoSpan::from_hz(40.0)).is_none());
-        let mut hints = hints();
-        let key = |i: i64| {
-            let at = MonoTime::ZERO + MonoSpan::from_ms(20 * i);
-            hints.on_key(at, 1, || None)
-        };
-        assert_eq!((0..200).filter_map(key).count(), 0);
+    fn nothing_is_said_of_pixels_of_unknown_size_or_speed_nor_of_a_slow_display() {
+        assert!(Hints::new(SIZE, None).is_none());
+        for (refresh_hz, speed) in [(120.0, None), (40.0, Some(800.0))] {
+            let mut hints = hints();
+            let key = |i: i64| {
+                let at = MonoTime::ZERO + MonoSpan::from_ms(20 * i);
+                hints.on_key(at, MonoSpan::from_hz(refresh_hz), 1920 * 1080, || speed)
+            };
+            assert_eq!((0..200).filter_map(key).count(), 0, "{refresh_hz}");
+        }
     }
 }

@@ -153,8 +153,7 @@ impl StreamThread {
             }
         }
         let size = [parts.create.format.width, parts.create.format.height];
-        let CoreConfig { engine, refresh_interval, .. } = parts.core;
-        let hints = Hints::new(size, engine.pixels_per_degree, refresh_interval);
+        let hints = Hints::new(size, parts.core.engine.pixels_per_degree);
         info!(stream = parts.ordinal, backend = core.backend().name, "stream starts");
         let window = parts.window.as_ref().and_then(|(opener, config)| {
             let mailbox = Arc::clone(&parts.mailbox);
@@ -199,6 +198,7 @@ impl StreamThread {
             }
             if mailbox.has_ui() {
                 self.repeats_in_a_row = 0;
+                self.core.on_news();
             }
             self.hear_window();
             let plan = self.core.plan(clock::now());
@@ -509,7 +509,9 @@ impl StreamThread {
         let pixels = valid.map_or(0, |it| u64::from(it.width) * u64::from(it.height));
         let content_time = MonoTime::from_ns(submit.content_time_ns);
         let speed = || core.inspect().and_then(|seen| seen.speed());
-        let hint = self.hints.as_mut().and_then(|it| it.on_key(content_time, pixels, speed));
+        let refresh_interval = core.pacing().refresh_interval;
+        let hints = self.hints.as_mut();
+        let hint = hints.and_then(|it| it.on_key(content_time, refresh_interval, pixels, speed));
         if let Some(hint) = hint {
             self.send(StreamEvent::Hint(hint));
         }

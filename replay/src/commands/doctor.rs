@@ -62,7 +62,8 @@ fn text(Report { motion, colour }: &Report) -> String {
     for finding in &motion.hypotheses {
         text += &format!("  {:22} {:7.2}\n", finding.name, finding.rms_levels);
     }
-    text += &format!("\n  {}\n\n", motion.verdict.as_deref().unwrap_or("nothing looks wrong"));
+    let nothing = if motion.keys == 0 { "too little moves to tell" } else { "nothing looks wrong" };
+    text += &format!("\n  {}\n\n", motion.verdict.as_deref().unwrap_or(nothing));
     text + &match (colour.gradients, colour.min_bits) {
         (0, _) => "colour: no smooth gradients; 8 bits will do".to_owned(),
         (gradients, Some(bits)) => format!(

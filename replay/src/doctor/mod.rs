@@ -88,7 +88,7 @@ pub fn examine_file(path: &Path, examination: &Examination<'_>) -> anyhow::Resul
 /// Looks into a recording.
 ///
 /// # Errors
-/// If a frame cannot be read, or no frame has motion since the one before it.
+/// If a frame cannot be read, or there is no motion plane.
 pub fn examine(
     recording: &mut dyn Recording,
     examination: &Examination<'_>,

@@ -27,7 +27,8 @@ pub fn warnings(info: &CaptureInfo) -> Vec<String> {
     }
     warnings.extend(info.damaged.iter().map(|damage| format!("a part is skipped: {damage}")));
     if info.gaps > 0 {
-        warnings.push(format!("{} frames arrived and were not recorded", info.gaps));
+        warnings
+            .push(format!("{} frames or user interfaces arrived and were not recorded", info.gaps));
     }
     warnings
 }

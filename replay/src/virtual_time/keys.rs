@@ -76,6 +76,14 @@ pub fn timed_uis(
         .map(|((number, _), arrives_at)| (*number, arrives_at))
         .collect();
     uis.sort_by_key(|(_, arrives_at)| *arrives_at);
+    // What came before the first key is shown from that one on.
+    let first = plan.keys.first().map(|key| &heads[key.frame]);
+    let first = first.zip(arrivals(heads, plan, timing).first().copied());
+    if let Some((head, arrives_at)) = first {
+        let earlier = recorded.iter().filter(|(_, arrived_at)| *arrived_at < head.arrived_at);
+        let newest = earlier.max_by_key(|(_, arrived_at)| *arrived_at);
+        uis.splice(..0, newest.map(|(number, _)| (*number, arrives_at)));
+    }
     uis
 }
 

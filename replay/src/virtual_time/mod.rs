@@ -142,6 +142,9 @@ pub fn replay(
     let mut next_ui = uis.next().transpose()?;
     let mut last_ui = MonoTime::ZERO;
     loop {
+        if next_ui.as_ref().is_some_and(|ui| ui.arrives_at <= clock) {
+            stream.core.on_news();
+        }
         let plan = stream.core.plan(clock);
         let is_taken = |key: &mut TimedKey| {
             plan.content_time.is_none() || (!stream.owes_picture && key.arrives_at <= plan.wake_at)
@@ -174,6 +177,14 @@ pub fn replay(
         if plan.content_time.is_none() || (is_over && stream.shown.is_some()) {
             losses.fell_back = stream.core.backend().fell_back.clone();
             return Ok(losses);
+        }
+        // Its arrival wakes the stream, which may plan an earlier picture for it.
+        if let Some(ui) = &next_ui
+            && ui.arrives_at > clock
+            && ui.arrives_at < plan.wake_at
+        {
+            clock = ui.arrives_at;
+            continue;
         }
         while let Some(ui) = next_ui.take_if(|ui| ui.arrives_at <= plan.wake_at) {
             let input = UiInput { plane: ui.plane.as_input(), place: ui.place };

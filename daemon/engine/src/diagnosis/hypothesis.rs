@@ -73,6 +73,11 @@ impl Hypothesis {
         all
     }
 
+    /// Whether it is about jitter, which differs where nothing moves too.
+    pub(super) fn is_jitter(self) -> bool {
+        matches!(self, Self::HasJitter | Self::HasJitterReversed)
+    }
+
     /// Name in reports.
     #[must_use]
     pub fn name(self) -> &'static str {

@@ -34,8 +34,11 @@ const MOVED_PX: f32 = 0.25;
 /// declared. In sound captures none comes below it: halving or doubling a motion of a few pixels
 /// leaves more.
 const CLEARLY: f64 = 0.7;
-/// Motion explains something where its error squared is below this part of that of standing still.
-const WORTH: f64 = 0.9;
+/// Motion does harm where its error squared is above that of standing still by this factor: grain and
+/// flicker, which nothing explains, make the two alike.
+const HARM: f64 = 1.1;
+/// Keys that are looked at, for each one wanted, until enough of them have moved.
+const PATIENCE: u32 = 16;
 /// Fewest samples that a finding takes, of all keys.
 const MIN_SAMPLES: u64 = 400;
 /// Fewest samples for a key to count as one that moves.
@@ -59,11 +62,23 @@ pub struct Diagnosis {
 /// Looks at the first keys of a stream.
 #[derive(Clone, Debug)]
 pub struct MotionCheck {
-    keys_left: u32,
+    wanted: u32,
+    looked: u32,
+    /// Keys that move by some way of reading, and as declared.
     keys: u32,
+    declared_keys: u32,
     samples: u64,
     hypotheses: Vec<Hypothesis>,
     squares: Vec<u64>,
+    declared: Declared,
+}
+
+/// Over the samples that move as declared alone.
+#[derive(Clone, Copy, Debug, Default)]
+struct Declared {
+    samples: u64,
+    /// As declared, and standing still.
+    squares: [u64; 2],
 }
 
 impl MotionCheck {
@@ -72,14 +87,25 @@ impl MotionCheck {
     pub fn new(format: &StreamFormat, keys: u32) -> Self {
         let hypotheses = Hypothesis::of(format);
         let squares = vec![0; hypotheses.len()];
-        let keys_left = if format.motion.is_some() { keys } else { 0 };
-        Self { keys_left, keys: 0, samples: 0, hypotheses, squares }
+        Self {
+            wanted: if format.motion.is_some() { keys } else { 0 },
+            looked: 0,
+            keys: 0,
+            declared_keys: 0,
+            samples: 0,
+            hypotheses,
+            squares,
+            declared: Declared::default(),
+        }
     }
 
-    /// Whether it has seen all that it looks at.
+    /// Whether it has seen all that it looks at: enough keys that move as declared, or enough of which
+    /// another way of reading makes clearly more, or nothing of the kind for long.
     #[must_use]
     pub fn is_done(&self) -> bool {
-        self.keys_left == 0
+        self.declared_keys >= self.wanted
+            || self.looked >= self.wanted.saturating_mul(PATIENCE)
+            || (self.keys >= self.wanted && self.reads_better(&self.errors()).is_some())
     }
 
     /// Looks at `key`, whose motion as decoded is `displacement`, and which follows `older`. Keys
@@ -101,17 +127,18 @@ impl MotionCheck {
             return;
         }
         let step = Step::new(format, key, displacement, older);
+        let declared_before = self.declared.samples;
         let samples = match (&key.color, &older.color) {
             (ColorPlane::Rgba8(now), ColorPlane::Rgba8(then)) => self.sum(&step, [now, then]),
             (ColorPlane::Rgb10a2(now), ColorPlane::Rgb10a2(then)) => self.sum(&step, [now, then]),
             (ColorPlane::Rgba16f(now), ColorPlane::Rgba16f(then)) => self.sum(&step, [now, then]),
             _ => return,
         };
+        self.looked += 1;
         self.samples += samples;
-        if samples >= MIN_SAMPLES_OF_KEY {
-            self.keys += 1;
-            self.keys_left -= 1;
-        }
+        let declared = self.declared.samples - declared_before;
+        self.keys += u32::from(samples >= MIN_SAMPLES_OF_KEY);
+        self.declared_keys += u32::from(declared >= MIN_SAMPLES_OF_KEY);
     }
 
     fn sum<T: Texel>(&mut self, step: &Step<'_>, [now, then]: [&Plane<T>; 2]) -> u64 {
@@ -126,19 +153,36 @@ impl MotionCheck {
                     *motion = hypothesis.displacement(&known);
                 }
                 // Written so that NaN fails it.
-                if !motions.iter().any(|[dx, dy]| dx.abs().max(dy.abs()) >= MOVED_PX) {
+                let moves = |[dx, dy]: &[f32; 2]| dx.abs().max(dy.abs()) >= MOVED_PX;
+                // Jitter moves a picture that stands still.
+                let read = self.hypotheses.iter().zip(&motions).filter(|(it, _)| !it.is_jitter());
+                if !read.map(|(_, motion)| motion).any(moves) {
                     continue;
                 }
-                let [at_x, at_y] = step.grid.centre(x, y);
+                let moves_as_declared = moves(&motions[0]);
+                // At a pixel: between pixels grain is weaker, and standing still would look better.
+                let [at_x, at_y] = step.grid.centre(x, y).map(f32::round);
                 let level = |plane: &Plane<T>, x: f32, y: f32| {
                     i64::from(sample(plane, step.valid, q8(x), q8(y)).luma8())
                 };
                 let shown = level(now, at_x, at_y);
-                for (squares, [dx, dy]) in self.squares.iter_mut().zip(&motions) {
+                let mut own = [0; 2];
+                for (index, (squares, [dx, dy])) in
+                    self.squares.iter_mut().zip(&motions).enumerate()
+                {
                     // What is unknown is taken to stand still.
                     let [dx, dy] = [dx, dy].map(|d| if d.is_finite() { *d } else { 0.0 });
                     let error = shown - level(then, at_x - dx, at_y - dy);
-                    *squares += error.unsigned_abs().pow(2);
+                    let square = error.unsigned_abs().pow(2);
+                    *squares += square;
+                    if let Some(own) = own.get_mut(index) {
+                        *own = square;
+                    }
+                }
+                if moves_as_declared {
+                    self.declared.samples += 1;
+                    self.declared.squares[0] += own[0];
+                    self.declared.squares[1] += own[1];
                 }
                 samples += 1;
             }
@@ -146,34 +190,47 @@ impl MotionCheck {
         samples
     }
 
-    /// What was found so far.
-    #[must_use]
+    /// (1) of every way of reading.
     #[expect(clippy::cast_precision_loss, reason = "sums over a few thousand samples of 16 bits")]
-    pub fn diagnosis(&self) -> Diagnosis {
+    fn errors(&self) -> Vec<(Hypothesis, f64)> {
         let samples = self.samples.max(1) as f64;
         let error = |squares: &u64| (*squares as f64 / samples).sqrt();
-        let errors: Vec<_> =
-            self.hypotheses.iter().copied().zip(self.squares.iter().map(error)).collect();
-        let verdict = (self.samples >= MIN_SAMPLES).then(|| judge(&errors)).flatten();
+        self.hypotheses.iter().copied().zip(self.squares.iter().map(error)).collect()
+    }
+
+    /// What was found so far.
+    #[must_use]
+    pub fn diagnosis(&self) -> Diagnosis {
+        let errors = self.errors();
+        let verdict = self.reads_better(&errors).or_else(|| self.does_harm());
         Diagnosis { keys: self.keys, samples: self.samples, errors, verdict }
     }
-}
 
-/// What `errors`, the first of which is as declared and the second standing still, come to.
-fn judge(errors: &[(Hypothesis, f64)]) -> Option<String> {
-    let (declared, still) = (errors[0].1, errors[1].1);
-    let best = errors[2..].iter().min_by(|a, b| a.1.total_cmp(&b.1));
-    match best {
-        Some((hypothesis, error)) if error * error < CLEARLY * declared.min(still).powi(2) => {
+    /// Another way of reading makes clearly more of the pictures than the declared one does, and than
+    /// standing still.
+    fn reads_better(&self, errors: &[(Hypothesis, f64)]) -> Option<String> {
+        let (declared, still) = (errors[0].1, errors[1].1);
+        let (hypothesis, error) = errors[2..].iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let is_clear = error * error < CLEARLY * declared.min(still).powi(2);
+        (is_clear && self.samples >= MIN_SAMPLES).then(|| {
             let says = hypothesis.says();
-            Some(format!(
+            format!(
                 "motion looks {says}: read otherwise, the error falls from {declared:.1} to {error:.1} levels"
-            ))
-        }
-        _ if declared * declared > WORTH * still * still => Some(format!(
-            "motion explains nothing: {declared:.1} levels of error with it, {still:.1} without"
-        )),
-        _ => None,
+            )
+        })
+    }
+
+    /// What the declared motion moves would be met better by standing still.
+    #[expect(clippy::cast_precision_loss, reason = "sums over a few thousand samples of 16 bits")]
+    fn does_harm(&self) -> Option<String> {
+        let Declared { samples, squares } = self.declared;
+        let [with, without] = squares.map(|sum| sum as f64 / samples.max(1) as f64);
+        (samples >= MIN_SAMPLES && with > HARM * without).then(|| {
+            let (with, without) = (with.sqrt(), without.sqrt());
+            format!(
+                "motion explains nothing: {with:.1} levels of error with it, {without:.1} without"
+            )
+        })
     }
 }
 

@@ -165,6 +165,30 @@ fn jitter_left_in_the_vectors_is_told_with_its_sign() {
 }
 
 #[test]
+fn grain_on_a_picture_that_stands_still_under_a_jittered_camera_is_no_fault() {
+    let format = format(CameraMotion::Included);
+    let mut check = MotionCheck::new(&format, 6);
+    let mut older: Option<KeyFrame> = None;
+    let mut look = |n: i32, d: [f32; 2]| {
+        let (mut newest, displacement) = key(0, d);
+        let at = MonoTime::from_ns(1_000_000 * u64::from((n + 1).cast_unsigned()));
+        (newest.content_time, newest.motion_from) = (at, Some(at - MonoSpan::from_ms(1)));
+        newest.color = ColorPlane::Rgba8(plane(SIZE[0], SIZE[1], |x, y| {
+            Rgba8(0x01_01_01 * (90 + hash(x, y, n.cast_unsigned()) % 40))
+        }));
+        newest.field_offset = [if n % 2 == 0 { 128 } else { -128 }; 2];
+        if let Some(older) = &older {
+            check.look(&format, &newest, &displacement, older);
+        }
+        older = Some(newest);
+    };
+    (0..20).for_each(|n| look(n, [0.0; 2]));
+    // A camera that sways by less than grain lets anybody see.
+    (20..40).for_each(|n| look(n, [0.3, 0.0]));
+    assert_eq!(check.diagnosis().verdict, None, "{:?}", check.diagnosis());
+}
+
+#[test]
 fn keys_that_tell_nothing_are_not_looked_at() {
     let elsewhere = found_of(CameraMotion::Included, RIGHT, |_, key| {
         key.motion_from = key.motion_from.map(|from| from - MonoSpan::from_ms(1));

@@ -257,6 +257,7 @@ impl Pacer {
     /// The picture of a started plan was not ready in time and is not handed over.
     pub fn on_dropped(&mut self) {
         self.counts.dropped += 1;
+        self.has_news = true; // nobody has seen it
         self.on_miss();
     }
 
@@ -271,6 +272,7 @@ impl Pacer {
     /// The frame that was planned for `planned` and handed over will never be shown: a newer one
     /// replaced it, or nobody sees the window.
     pub fn on_discarded(&mut self, planned: MonoTime) {
+        self.has_news = true; // nobody has seen it
         let is_blamed = self.variable.is_none() && self.discards_in_a_row < DISCARDS_TO_BLAME;
         self.flight.on_discarded(planned, self.interval(), is_blamed);
         self.discards_in_a_row = self.discards_in_a_row.saturating_add(1);

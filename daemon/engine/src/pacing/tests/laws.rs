@@ -86,6 +86,8 @@ struct World {
     is_visible: bool,
     is_watched: bool,
     stride: u8,
+    /// Whether something is to be seen that no picture was handed over of.
+    has_news: bool,
     now: MonoTime,
     refresh: MonoSpan,
     key_interval: MonoSpan,
@@ -120,6 +122,7 @@ impl World {
             is_visible: true,
             is_watched: false,
             stride: 1,
+            has_news: false,
             now: MonoTime::from_ns(5_000_000_000),
             refresh,
             key_interval: MonoSpan::from_hz(key_hz),
@@ -181,6 +184,7 @@ impl World {
         self.pacer.on_key(content_time, self.now, is_cut);
         self.newest = Some(content_time);
         self.key_since_start = true;
+        self.has_news = true;
     }
 
     /// Lives through `ms`; keys arrive if they have a jitter.
@@ -220,10 +224,12 @@ impl World {
         self.last_target = plan.present_at;
         self.started = Some(*plan);
         self.key_since_start = false;
+        self.has_news = false;
         let shows_key = plan.content_time == self.newest;
         let work = if shows_key { self.work.scale(1, 4) } else { self.work };
         if self.now + work > plan.submit_by {
             self.pacer.on_dropped();
+            self.has_news = true;
         } else {
             if self.is_watched {
                 self.pacer.on_handed_over(plan, self.now + work);
@@ -289,8 +295,9 @@ impl World {
         // A display that answers nothing, or nobody sees, is given less; on a variable one there is
         // nothing to show at every instant, but a key goes out at once.
         let is_slowed = status.unanswered > 1 || status.feedback == FeedbackState::Hidden;
-        let has_stride = self.stride > 1 || self.kind == RefreshKind::Variable;
-        let waits = has_stride && !self.key_since_start;
+        let waits = self.kind == RefreshKind::Variable && !self.key_since_start;
+        let passed_over = if self.has_news { 0 } else { i64::from(self.stride) - 1 };
+        let latest = latest + status.refresh_interval.scale(passed_over, 1);
         if !is_slowed && !waits {
             prop_assert!(plan.present_at <= latest, "a refresh was passed over: {:?}", plan);
         }

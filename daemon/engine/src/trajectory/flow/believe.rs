@@ -41,8 +41,8 @@ pub(super) fn believe(now: &Level, at: [i32; 2], step: Step, error: u32, still: 
     Block { step, belief }
 }
 
-/// Whether at least half of the blocks that can tell are explained: two pictures of different
-/// places have hardly any in common.
+/// Whether at least half of the blocks are explained, or flat: two pictures of different places
+/// have hardly any in common.
 pub(super) fn is_believable(blocks: &Plane<Block>) -> bool {
     let count = |belief: Belief| blocks.data().iter().filter(|b| b.belief == belief).count();
     count(Belief::Unexplained) <= count(Belief::Explained) + count(Belief::Flat)

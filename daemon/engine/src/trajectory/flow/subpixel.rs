@@ -19,7 +19,7 @@ const ITERATIONS: usize = 3;
 /// DAMPING of (4): that of a difference of four steps of luma over every pixel, which noise may
 /// make.
 const DAMPING: i64 = 64 * 16;
-/// Least of D to a side in one step, and farthest away from where it began, Q8 pixels.
+/// Most that D moves to a side in one step, and farthest from where it began, Q8 pixels.
 const MOST: i32 = 256;
 
 /// A step of the answer in Q8.
