@@ -34,8 +34,8 @@ const MOVED_PX: f32 = 0.25;
 /// declared. In sound captures none comes below it: halving or doubling a motion of a few pixels
 /// leaves more.
 const CLEARLY: f64 = 0.7;
-/// Motion does harm where its error squared is above that of standing still by this factor: grain and
-/// flicker, which nothing explains, make the two alike.
+/// Motion does harm where its error squared is above that of standing still by this factor: grain
+/// and flicker, which nothing explains, make the two alike.
 const HARM: f64 = 1.1;
 /// Keys that are looked at, for each one wanted, until enough of them have moved.
 const PATIENCE: u32 = 16;
@@ -99,8 +99,8 @@ impl MotionCheck {
         }
     }
 
-    /// Whether it has seen all that it looks at: enough keys that move as declared, or enough of which
-    /// another way of reading makes clearly more, or nothing of the kind for long.
+    /// Whether it has seen all that it looks at: enough keys that move as declared, or enough of
+    /// which another way of reading makes clearly more, or nothing of the kind for long.
     #[must_use]
     pub fn is_done(&self) -> bool {
         self.declared_keys >= self.wanted
@@ -206,8 +206,8 @@ impl MotionCheck {
         Diagnosis { keys: self.keys, samples: self.samples, errors, verdict }
     }
 
-    /// Another way of reading makes clearly more of the pictures than the declared one does, and than
-    /// standing still.
+    /// Another way of reading makes clearly more of the pictures than the declared one does, and
+    /// than standing still.
     fn reads_better(&self, errors: &[(Hypothesis, f64)]) -> Option<String> {
         let (declared, still) = (errors[0].1, errors[1].1);
         let (hypothesis, error) = errors[2..].iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
