@@ -118,9 +118,6 @@ enum Display {
 const FIRST_DEADLINE: MonoSpan = MonoSpan::from_ms(4);
 /// The same on fast displays, as a share of the refresh interval.
 const FIRST_DEADLINE_PERCENT: i64 = 55;
-/// What the first in-between frame is expected to take: at 1280x720 and on two processors, while
-/// nothing is in any cache.
-const FIRST_WORK: MonoSpan = MonoSpan::from_ms(6);
 /// A picture is made for one refresh in so many, however slowly things move: about the key interval
 /// of the slowest application on the fastest display.
 const LONGEST_STRIDE: u32 = 8;
@@ -196,7 +193,7 @@ fn new_pacer(method: Method, refresh_interval: MonoSpan, known_refresh: Option<M
         refresh: RefreshKind::Fixed,
         known_refresh,
         interpolates: method.interpolates(),
-        work: WorkEstimate::Measured { first: FIRST_WORK.min(refresh_interval.scale(3, 4)) },
+        work: WorkEstimate::learned(refresh_interval),
     })
 }
 

@@ -11,6 +11,9 @@
 use super::recent::Recent;
 use crate::time::MonoSpan;
 
+/// What the first in-between frame is expected to take: at 1280x720 and on two processors, while
+/// nothing is in any cache.
+const FIRST_WORK: MonoSpan = MonoSpan::from_ms(6);
 /// Frames that the work estimate looks back on: half a second at 120 Hz.
 const WORK_WINDOW: usize = 64;
 /// Of fewer there is no 95th percentile: until then half as much again is planned for, but no more
@@ -47,6 +50,14 @@ pub enum WorkEstimate {
     },
     /// Always this, so that plans repeat exactly.
     Constant(MonoSpan),
+}
+
+impl WorkEstimate {
+    /// Learned, on a display with these refreshes.
+    #[must_use]
+    pub fn learned(refresh_interval: MonoSpan) -> Self {
+        Self::Measured { first: FIRST_WORK.min(refresh_interval.scale(3, 4)) }
+    }
 }
 
 /// What a picture shows.

@@ -136,7 +136,7 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
         refresh: RefreshKind::Fixed,
         known_refresh: None,
         interpolates: false,
-        work: WorkEstimate::Measured { first: scenario.display.refresh_interval.scale(7, 8) },
+        work: WorkEstimate::learned(scenario.display.refresh_interval),
     };
     let ours = simulate(&scenario, Policy::Pacer(config));
     let naive = simulate(&scenario, Policy::NaiveTimer);
