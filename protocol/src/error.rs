@@ -64,7 +64,7 @@ pub enum Error {
         found: String,
     },
     /// A key frame or UI plane that is not newer than the one before it.
-    #[error("submit, field {field}: expected more than {last}, found {found}")]
+    #[error("field {field}: expected more than {last}, found {found}")]
     Order {
         /// The field.
         field: &'static str,

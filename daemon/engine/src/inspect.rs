@@ -15,11 +15,9 @@ use crate::trajectory::rung::Rung;
 const SPEED_STRIDE: usize = 4;
 /// Pixels between the samples that shares are counted of, per axis.
 const SHARE_STRIDE: usize = 16;
-/// Columns and rows of the pixels that [`Inspection::speed`] looks at.
-const PROBES: [u32; 2] = [32, 18];
 /// Motion that counts, pixels per motion span.
 const MOVED_PX: f32 = 0.25;
-/// If less than one in so many of those pixels moves, the picture is still.
+/// If less than one in so many of those cells moves, the picture is still.
 const STILL_PART: usize = 16;
 
 /// The newest key, seen pixel by pixel.
@@ -45,26 +43,34 @@ impl Inspection<'_> {
     /// How fast the picture moves, pixels per second: the median speed of what moves, or 0 where
     /// nearly nothing does. None without motion.
     #[must_use]
-    #[expect(clippy::cast_possible_truncation, reason = "seconds need no more than an f32")]
     pub fn speed(&self) -> Option<f32> {
-        let seconds = self.key.motion_span()?.as_secs_f64() as f32;
-        let valid = self.key.valid;
-        let place =
-            |i: u32, of: u32, from: u32, length: u32| from + (2 * i + 1) * length / (2 * of);
-        let [columns, rows] = PROBES;
-        let places = (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y)));
-        let speeds = places.filter_map(|(x, y)| {
-            let x = place(x, columns, valid.x, valid.width);
-            let y = place(y, rows, valid.y, valid.height);
-            self.motion_at(x, y).map(|[dx, dy]| libm::hypotf(dx, dy))
-        });
-        let mut moving: Vec<f32> = speeds.filter(|speed| *speed > MOVED_PX).collect();
-        if moving.len() * STILL_PART < (columns * rows) as usize {
+        let (mut speeds, seconds) = self.speeds()?;
+        let all = speeds.len();
+        speeds.retain(|speed| *speed > MOVED_PX);
+        if speeds.len() * STILL_PART < all {
             return Some(0.0);
         }
-        let middle = moving.len() / 2;
-        let (_, median, _) = moving.select_nth_unstable_by(middle, f32::total_cmp);
-        Some(*median / seconds)
+        Some(ranked(&mut speeds, 50) / seconds)
+    }
+
+    /// The speed that one surface in a hundred exceeds, pixels per second. None without motion.
+    #[must_use]
+    pub fn highest_speed(&self) -> Option<f32> {
+        let (mut speeds, seconds) = self.speeds()?;
+        Some(ranked(&mut speeds, 99) / seconds)
+    }
+
+    /// Speeds at some cells, pixels per motion span, and that span in seconds.
+    #[expect(clippy::cast_possible_truncation, reason = "seconds need no more than an f32")]
+    fn speeds(&self) -> Option<(Vec<f32>, f32)> {
+        let seconds = self.key.motion_span()?.as_secs_f64() as f32;
+        let field = &self.key.velocity;
+        let rows = (0..field.height()).step_by(SPEED_STRIDE);
+        let cells = rows.flat_map(|y| field.row(y).iter().step_by(SPEED_STRIDE));
+        let tracked = cells.filter(|velocity| velocity.is_trackable());
+        let speed =
+            |v: &Velocity| libm::hypotf(f32::from(v.x), f32::from(v.y)) / Velocity::PER_PX as f32;
+        Some((tracked.map(speed).collect(), seconds))
     }
 
     /// The model that the surface at a pixel goes on by.
@@ -146,24 +152,6 @@ impl Inspection<'_> {
         uncovered
     }
 
-    /// The speed that one surface in a hundred exceeds, pixels per motion span. 0 where nothing is
-    /// known to move.
-    #[must_use]
-    pub fn fast_px(&self) -> f32 {
-        let field = &self.key.velocity;
-        let rows = (0..field.height()).step_by(SPEED_STRIDE);
-        let mut speeds: Vec<u16> = rows
-            .flat_map(|y| field.row(y).iter().step_by(SPEED_STRIDE))
-            .filter(|velocity| velocity.is_trackable())
-            .map(|velocity| velocity.x.unsigned_abs().max(velocity.y.unsigned_abs()))
-            .collect();
-        let rank = speeds.len() * 99 / 100;
-        if rank >= speeds.len() {
-            return 0.0;
-        }
-        f32::from(*speeds.select_nth_unstable(rank).1) / Velocity::PER_PX as f32
-    }
-
     /// The cell of the field grid that holds a pixel of the image.
     fn cell_at(&self, x: u32, y: u32) -> Option<[u32; 2]> {
         if self.key.velocity.data().is_empty() || self.key.motion_from.is_none() {
@@ -174,6 +162,12 @@ impl Inspection<'_> {
         let y = y.checked_sub(valid.y).filter(|y| *y < valid.height)?;
         Some([self.map.x.cell_of(x), self.map.y.cell_of(y)])
     }
+}
+
+/// What `percent` of `speeds` do not exceed; 0 of none.
+fn ranked(speeds: &mut [f32], percent: usize) -> f32 {
+    let rank = speeds.len() * percent / 100;
+    if rank >= speeds.len() { 0.0 } else { *speeds.select_nth_unstable_by(rank, f32::total_cmp).1 }
 }
 
 impl Engine {

@@ -40,7 +40,8 @@ pub enum MaskClass {
 pub enum Source {
     /// Its own vector's.
     Vector,
-    /// That of the picture, where it explains the two newest keys, and none where it does not.
+    /// That of the picture, where it explains the two newest keys, and none where it does not. Where
+    /// the two have too little in common to tell, its own vector's.
     Picture,
     /// That of the surface around it, else of the picture, else none: it is held.
     Surroundings,
@@ -201,7 +202,7 @@ mod tests {
             let [right, down] = found.at(x, 4);
             assert_eq!((!right.is_nan()).then_some([right, down]), expected, "column {x}");
         }
-        // Of the fill: without a mask the vectors are left alone.
+        // Without invalid cells the vectors are left alone.
         let mut same = vectors.clone();
         fill_invalid(&pool(2), &plane(60, 9, |_, _| 1), &depth, &mut same);
         assert_eq!(same, vectors);

@@ -327,16 +327,14 @@ impl StreamCore {
     }
 
     /// Refreshes in which what moves fastest moves by the least step.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to the longest")]
-    #[expect(clippy::cast_precision_loss, reason = "spans of milliseconds")]
+    #[expect(clippy::cast_possible_truncation, reason = "1 to the longest, and seconds")]
+    #[expect(clippy::cast_sign_loss, reason = "speeds are positive")]
     fn stride(&self) -> u32 {
-        let span =
-            self.newest_key.and_then(|key| Some(key.content_time - key.previous_content_time?));
-        let fast_px = self.engine.inspect().map_or(0.0, |inspection| inspection.fast_px());
-        let Some(span) = span.filter(|span| *span > MonoSpan::ZERO) else { return 1 };
-        let refreshes = span.as_ns() as f32 / self.interval().as_ns().max(1) as f32;
-        let needed = self.least_step_px * refreshes / fast_px;
-        if needed >= LONGEST_STRIDE as f32 { LONGEST_STRIDE } else { (needed.ceil() as u32).max(1) }
+        let speed = self.engine.inspect().and_then(|inspection| inspection.highest_speed());
+        let Some(speed) = speed else { return 1 };
+        let needed = self.least_step_px / (speed * self.interval().as_secs_f64() as f32);
+        // Casts saturate: of what stands still, the longest.
+        (needed.ceil() as u32).clamp(1, LONGEST_STRIDE)
     }
 
     /// Shows a user interface over every picture from now on, unless one that came in later is

@@ -173,19 +173,18 @@ fn each_refresh_is_in_exactly_one_count_whatever_happens() {
 #[test]
 fn in_betweens_are_left_out_until_something_has_moved_far_enough_and_keys_never_are() {
     // 0.75 pixels a refresh, 4 refreshes a key.
-    let made = |least_step_px| {
+    let made = |least_step_px: f32, key_ms: i64| {
         let mut rig = Rig::with_least_step(Method::Linear, least_step_px);
         rig.play(4);
         let before = rig.core.counts();
         let mut keys = Vec::new();
-        for key in 4..24 {
-            keys.extend(rig.make_until(at_ms(1_000 + 40 * key)).into_iter().filter_map(
-                |outcome| {
-                    let FrameOutcome::Presented(frame) = outcome else { return None };
-                    Some(frame.key_index)
-                },
-            ));
-            rig.key(1_000 + 40 * key);
+        for key in 1..21 {
+            let key_at = 1_120 + key_ms * key;
+            keys.extend(rig.make_until(at_ms(key_at)).into_iter().filter_map(|outcome| {
+                let FrameOutcome::Presented(frame) = outcome else { return None };
+                Some(frame.key_index)
+            }));
+            rig.key(key_at);
         }
         keys.dedup();
         assert!(keys.len() >= 20, "{least_step_px}: {keys:?}");
@@ -193,7 +192,9 @@ fn in_betweens_are_left_out_until_something_has_moved_far_enough_and_keys_never_
         assert_eq!(after.dropped, before.dropped, "{least_step_px}");
         after.real + after.synthesised - before.real - before.synthesised
     };
-    assert_eq!([0.0, 0.75, 1.4, 100.0].map(made), [80, 80, 40, 20]);
+    assert_eq!([0.0, 0.75, 1.4, 100.0].map(|step| made(step, 40)), [80, 80, 40, 20]);
+    // A key was skipped each time: motion still spans 40 ms.
+    assert_eq!(made(1.4, 80), 80);
 }
 
 #[test]
