@@ -39,6 +39,7 @@ pub enum Event {
         /// Why.
         reason: EndReason,
     },
-    /// Something that this client sent was wrong. A fatal one ends the session.
+    /// Something that this client sent was wrong. A fatal one ends the session; one of code
+    /// `content` refuses nothing: what the planes hold looks otherwise than declared.
     Refused(ErrorMessage),
 }

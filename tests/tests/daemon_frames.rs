@@ -225,20 +225,24 @@ fn a_recording_holds_the_poses_that_led_pictures() {
     assert!((arrivals[0]..=arrivals[1]).contains(&found.arrived_at_ns), "{arrivals:?}");
 }
 
+/// A stream whose vectors are pixels from the older place to the newer, times `scale`.
+fn with_motion(width: u32, height: u32, scale: [f32; 2]) -> StreamFormat {
+    let motion = MotionConvention {
+        format: MotionFormat::Rg32f,
+        direction: MotionDirection::PreviousToCurrent,
+        unit: MotionUnit::Pixels,
+        scale,
+        camera_motion: CameraMotion::Included,
+    };
+    StreamFormat { motion: Some(motion), ..StreamFormat::rgba8(width, height) }
+}
+
 #[test]
 fn a_client_whose_motion_is_flipped_is_told_and_one_whose_motion_is_right_is_not() {
     let mut daemon = RunningDaemon::start("null");
     let said = [1.0, -1.0].map(|sign| {
         let mut client = daemon.connect();
-        let motion = MotionConvention {
-            format: MotionFormat::Rg32f,
-            direction: MotionDirection::PreviousToCurrent,
-            unit: MotionUnit::Pixels,
-            scale: [1.0, sign],
-            camera_motion: CameraMotion::Included,
-        };
-        let format = StreamFormat { motion: Some(motion), ..StreamFormat::rgba8(64, 48) };
-        let mut source = client.open_stream_of(1, format);
+        let mut source = client.open_stream_of(1, with_motion(64, 48, [1.0, sign]));
         let mut before = None;
         for key in 0..16_u32 {
             let mut submit = source.fill(RED);
@@ -440,17 +444,7 @@ fn a_client_whose_picture_stands_still_is_told_to_render_it_whole_and_no_oftener
     let args = foreframed::Args { ppd: Some(40.0), ..Default::default() };
     let daemon = RunningDaemon::start_with("null", args);
     let mut client = daemon.connect();
-    let format = StreamFormat {
-        motion: Some(MotionConvention {
-            format: MotionFormat::Rg16f,
-            direction: MotionDirection::CurrentToPrevious,
-            unit: MotionUnit::Pixels,
-            scale: [1.0; 2],
-            camera_motion: CameraMotion::Included,
-        }),
-        ..StreamFormat::rgba8(64, 32)
-    };
-    let mut source = client.open_stream_of(1, format);
+    let mut source = client.open_stream_of(1, with_motion(64, 32, [1.0; 2]));
     let first = source.fill(RED).content_time_ns;
     for key in 1..=60 {
         let mut submit = source.fill(RED);

@@ -13,6 +13,7 @@ pub mod command;
 pub mod core;
 mod display;
 pub mod hints;
+mod intake;
 pub mod mailbox;
 pub mod observed;
 pub mod outlet;

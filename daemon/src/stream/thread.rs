@@ -12,11 +12,11 @@ use std::thread::{self, JoinHandle};
 use calloop::channel::Sender;
 use foreframe_engine::engine::MotionState;
 use foreframe_engine::pacing::Plan;
-use foreframe_engine::{DecodeError, KeyReport, Method, MonoSpan, MonoTime};
+use foreframe_engine::{Method, MonoSpan, MonoTime};
 use foreframe_protocol::slots::Holds;
 use foreframe_protocol::{
-    CreateStream, Error, ErrorCode, ErrorMessage, OutputFrame, OutputKind, Pacing, PlaneKind,
-    PlaneMap, Presented, Statistics, StreamFormat, Submit,
+    CreateStream, ErrorCode, ErrorMessage, OutputFrame, OutputKind, Pacing, PlaneKind, Presented,
+    Statistics, Submit,
 };
 use thread_priority::{
     RealtimeThreadSchedulePolicy, ThreadPriority, ThreadPriorityValue, ThreadSchedulePolicy,
@@ -28,15 +28,15 @@ use super::command::StreamCommand;
 use super::core::{CoreConfig, DroppedFrame, FrameKind, FrameOutcome, PresentedFrame, StreamCore};
 use super::display::WindowDisplay;
 use super::hints::Hints;
+use super::intake::Intake;
 use super::mailbox::{Mailbox, Submission, Taken, UiSubmission};
 use super::observed::{KeyInstants, Observed};
-use super::planes::{PlaneCopier, SlotPlanes};
 use super::{FromStream, StreamEvent};
 use crate::clock::{self, Alarm, Woken};
 use crate::control::StreamStatus;
 use crate::gpu::Gpus;
 use crate::hud::HudView;
-use crate::ingest::{self, IngestError, PlaneSource};
+use crate::ingest;
 use crate::recorder::StreamRecorder;
 use crate::sink::window::{WindowConfig, WindowOpener};
 use crate::sink::worker::SinkWorker;
@@ -106,8 +106,7 @@ struct StreamThread {
     parts: StreamParts,
     core: StreamCore,
     window: Option<WindowDisplay>,
-    copier: PlaneCopier,
-    ui_copier: PlaneCopier,
+    intake: Intake,
     /// The newest key, until the first picture made from it is shown.
     unshown: Option<Unshown>,
     /// Whether no picture was made since the newest key was taken in.
@@ -163,8 +162,7 @@ impl StreamThread {
             parts,
             core,
             window,
-            copier: PlaneCopier::default(),
-            ui_copier: PlaneCopier::default(),
+            intake: Intake::default(),
             unshown: None,
             owes_picture: false,
             refused: 0,
@@ -263,7 +261,9 @@ impl StreamThread {
 
     fn take_key(&mut self, submission: &Submission) {
         let started_at = clock::now();
-        let taken = self.read_key(submission);
+        let recorder = self.parts.recorder.as_mut();
+        let format = &self.parts.create.format;
+        let taken = self.intake.key(format, submission, recorder, &mut self.core);
         if let Some(slot) = self.parts.mailbox.release(Holds::Key) {
             self.send(StreamEvent::SlotCopied(slot));
         }
@@ -308,59 +308,17 @@ impl StreamThread {
         }));
     }
 
-    /// Hands a key out of its slot to the engine, and to the recorder if there is one.
-    fn read_key(&mut self, submission: &Submission) -> Result<KeyReport, ErrorMessage> {
-        let Submission { submit, arrived_at, pool, slot_offset } = submission;
-        let format = &self.parts.create.format;
-        let outside = |error: Error| ErrorMessage::new(&error, false, None);
-        let (core, described) = (&mut self.core, &submit.planes);
-        if let Some(recorder) = &mut self.parts.recorder {
-            let copied = self.copier.copy(format, described, pool, *slot_offset);
-            let planes = copied.map_err(outside)?;
-            recorder.offer(submit, *arrived_at, &planes);
-            let source = |kind| planes.get(kind).map(PlaneSource::Packed);
-            take_in(core, format, submission, source)
-        } else {
-            let planes = SlotPlanes::new(format, described, pool, *slot_offset);
-            let planes = planes.map_err(outside)?;
-            let source = |kind| planes.get(kind).map(PlaneSource::InSlot);
-            take_in(core, format, submission, source)
-        }
-    }
-
     /// Shows a UI plane from the next picture on, if it is the newest.
     fn take_ui(&mut self, submission: &UiSubmission) {
-        let taken = self.read_ui(submission);
+        let recorder = self.parts.recorder.as_mut();
+        let format = &self.parts.create.format;
+        let taken = self.intake.ui(format, submission, recorder, &mut self.core);
         if let Some(slot) = self.parts.mailbox.release(Holds::Ui) {
             self.send(StreamEvent::SlotCopied(slot));
         }
         if let Err(message) = taken {
             debug!(expected = message.expected, found = message.found, "UI plane refused");
             self.send(StreamEvent::KeyRefused(message));
-        }
-    }
-
-    /// Hands a UI plane out of its slot to the engine, and to the recorder if there is one.
-    fn read_ui(&mut self, submission: &UiSubmission) -> Result<(), ErrorMessage> {
-        let UiSubmission { ui, arrived_at, pool, slot_offset } = submission;
-        let format = &self.parts.create.format;
-        let outside = |error: Error| ErrorMessage::new(&error, false, None);
-        let core = &mut self.core;
-        let mut take_in = |source: Option<PlaneSource<'_>>| {
-            let source = source.unwrap_or(PlaneSource::Packed(&[]));
-            let input = ingest::ui_input(format, ui, source).map_err(wrong)?;
-            core.set_ui(&input, *arrived_at).map_err(undeclared)
-        };
-        let described = PlaneMap::from_fn(|kind| (kind == PlaneKind::Ui).then_some(ui.plane));
-        if let Some(recorder) = &mut self.parts.recorder {
-            let copied = self.ui_copier.copy(format, &described, pool, *slot_offset);
-            let planes = copied.map_err(outside)?;
-            recorder.offer_ui(ui, *arrived_at, &planes);
-            take_in(planes.get(PlaneKind::Ui).map(PlaneSource::Packed))
-        } else {
-            let planes = SlotPlanes::new(format, &described, pool, *slot_offset);
-            let planes = planes.map_err(outside)?;
-            take_in(planes.get(PlaneKind::Ui).map(PlaneSource::InSlot))
         }
     }
 
@@ -595,34 +553,6 @@ impl Mean {
     fn mean_ns(&self) -> u64 {
         self.sum_ns.checked_div(self.count).unwrap_or(0)
     }
-}
-
-/// Takes in a key, and the user interface that came with it.
-fn take_in<'a>(
-    core: &mut StreamCore,
-    format: &StreamFormat,
-    Submission { submit, arrived_at, .. }: &Submission,
-    source: impl Fn(PlaneKind) -> Option<PlaneSource<'a>>,
-) -> Result<KeyReport, ErrorMessage> {
-    let input = ingest::key_input(format, submit, &source).map_err(wrong)?;
-    let ui = ingest::ui_of_key(format, submit, &source).map_err(wrong)?;
-    let report = core.on_key(&input, clock::now).map_err(undeclared)?;
-    if let Some(ui) = ui {
-        core.set_ui(&ui, *arrived_at).map_err(undeclared)?;
-    }
-    Ok(report)
-}
-
-fn wrong(error: IngestError) -> ErrorMessage {
-    plane_error(error.parts())
-}
-
-fn undeclared(error: DecodeError) -> ErrorMessage {
-    plane_error(("planes".into(), "what the stream declares".into(), error.to_string()))
-}
-
-fn plane_error((field, expected, found): (String, String, String)) -> ErrorMessage {
-    ErrorMessage { code: ErrorCode::Plane, is_fatal: false, stream: None, field, expected, found }
 }
 
 /// Asks for a priority that keeps wakes on time on a busy machine. Many machines do not grant it.
