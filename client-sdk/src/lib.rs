@@ -51,7 +51,7 @@ pub use event::Event;
 pub use foreframe_protocol::{
     Camera, CameraMotion, ColorFormat, DepthFormat, DepthMeaning, EndReason, ErrorCode,
     ErrorMessage, Features, GpuKind, Hint, MaskClass, MotionDirection, MotionFormat, MotionUnit,
-    OutputKind, Pacing, PciAddress, PlaneKind, PlaneSize, Presented, Primaries, Rect,
+    OutputKind, Pacing, PciAddress, PlaneKind, PlaneSize, Presented, Primaries, ProfileName, Rect,
     ReleaseReason, SlotReleased, Statistics, Transfer, ValidRectUse, Welcome,
 };
 pub use frame::{KeyFrame, PlaneMut};

@@ -5,7 +5,7 @@ use foreframe_protocol::limits::DEFAULT_SLOTS;
 use foreframe_protocol::{
     CameraMotion, ColorFormat, CreateStream, DepthConvention, DepthFormat, DepthMeaning,
     MaskFormat, MotionConvention, MotionDirection, MotionFormat, MotionUnit, PlaneKind, PlaneMap,
-    PlaneSize, Primaries, StreamFormat, Transfer, ValidRectUse,
+    PlaneSize, Primaries, ProfileName, StreamFormat, Transfer, ValidRectUse,
 };
 
 use crate::error::{Error, Result};
@@ -160,6 +160,15 @@ impl StreamOptions {
     pub fn mask(mut self, ratio: f64) -> Self {
         self.format.mask = Some(MaskFormat::Class8);
         self.mask_ratio = ratio;
+        self
+    }
+
+    /// The display that the picture is for, by the name of a profile that the daemon knows: a built-in
+    /// one (`foreframe perception displays`) or one of its user. It takes the place of the daemon's
+    /// `--profile`. A name that the daemon does not know ends the stream with an error
+    /// ([`ErrorCode::Unsupported`](crate::ErrorCode::Unsupported)) that lists those it knows.
+    pub fn display_profile(mut self, name: ProfileName) -> Self {
+        self.format.display_profile = Some(name);
         self
     }
 

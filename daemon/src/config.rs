@@ -14,10 +14,12 @@ use std::time::Duration;
 use foreframe_engine::backend::choice::BackendChoice;
 use foreframe_engine::{FinishConfig, FinishMode, Method, MonoSpan};
 use foreframe_perception::display::DisplayProfile;
+use foreframe_protocol::ProfileName;
 use serde::{Deserialize, Deserializer};
 use tracing_subscriber::EnvFilter;
 
 use crate::hud::HudView;
+use crate::profiles::{Profiles, UnknownProfile, Viewed};
 use crate::sink::window::WindowOptions;
 
 /// Arguments of `foreframed` and of `foreframe serve`.
@@ -82,9 +84,13 @@ pub struct Args {
     pub finish: Option<FinishMode>,
     /// Display that shows the output: a built-in profile (`foreframe perception displays`) or a
     /// file that ends in .toml. Where there is no --ppd it gives that too, from 65 cm before a
-    /// screen
+    /// screen. A stream that names a profile is for that display instead
     #[arg(long, value_name = "NAME")]
     pub profile: Option<String>,
+    /// Folder of display profiles, files that end in .toml, which streams may name beside the
+    /// built-in ones
+    #[arg(long, value_name = "DIR")]
+    pub profiles: Option<PathBuf>,
     /// What to log on standard error: error, warn, info, debug, trace, or a filter such as
     /// foreframed::session=debug [default: info]
     #[arg(long, value_name = "LEVEL")]
@@ -248,8 +254,14 @@ pub struct Config {
     pub threads: NonZeroUsize,
     /// Angular size of a pixel, which turns on damping.
     pub pixels_per_degree: Option<f32>,
+    /// Whether the user said that size, which then holds whatever display a stream is for.
+    pub is_ppd_given: bool,
     /// Whether detail moves from in-between frames to their keys, and the display that it is for.
     pub finish: FinishConfig,
+    /// Name of that display.
+    pub profile: Option<String>,
+    /// Displays that a stream may name.
+    pub profiles: Profiles,
     /// Filter of the log.
     pub log: String,
     /// Clients at once.
@@ -299,6 +311,7 @@ impl Args {
             ppd: self.ppd.or(file.ppd),
             finish: self.finish.or(file.finish),
             profile: self.profile.or(file.profile),
+            profiles: self.profiles.or(file.profiles),
             log: self.log.or(file.log),
             max_clients: self.max_clients.or(file.max_clients),
             memory_mb: self.memory_mb.or(file.memory_mb),
@@ -325,7 +338,15 @@ impl Args {
                 format!("--ppd: expected 1 to 1000 pixels per degree, found {ppd}")
             })?;
         }
+        let mut profiles = self.profiles.as_deref().map(Profiles::read).transpose()?;
         let profile = self.profile.as_deref().map(read_profile).transpose()?;
+        if let Some(own) = self.profile.as_deref().filter(|name| name.ends_with(".toml"))
+            && let Some(profile) = &profile
+            && profiles.as_ref().is_none_or(|profiles| profiles.named(profile.name()).is_err())
+        {
+            let added = profiles.get_or_insert_default().add(profile.clone());
+            added.map_err(|error| UsageError(format!("profile {own}: {error}")))?;
+        }
         let max_clients = self.max_clients.unwrap_or(16);
         ensure((1..=256).contains(&max_clients), || {
             format!("--max-clients: expected 1 to 256, found {max_clients}")
@@ -358,7 +379,10 @@ impl Args {
             record: self.record,
             threads: self.threads.unwrap_or(processors),
             pixels_per_degree: self.ppd.or_else(|| profile.as_ref().and_then(profile_ppd)),
+            is_ppd_given: self.ppd.is_some(),
             finish: FinishConfig::new(mode, profile.as_ref(), refresh_interval),
+            profile: profile.map(|profile| profile.name().to_owned()),
+            profiles: profiles.unwrap_or_default(),
             log,
             max_clients,
             memory_per_client: memory_mb << 20,
@@ -379,6 +403,29 @@ impl Config {
         self.refresh_interval.scale(refreshes, 1)
     }
 
+    /// What is known of the display of a stream that names `profile`: it wins over the daemon's own,
+    /// but not over an angular size that the user said.
+    ///
+    /// # Errors
+    /// Which names there are.
+    pub fn viewed(&self, profile: Option<&ProfileName>) -> Result<Viewed, UnknownProfile> {
+        let Some(name) = profile else {
+            return Ok(Viewed {
+                name: self.profile.clone(),
+                pixels_per_degree: self.pixels_per_degree,
+                finish: self.finish,
+            });
+        };
+        let profile = self.profiles.named(name.as_str())?;
+        let FinishConfig { mode, refresh_interval, .. } = self.finish;
+        let given = self.pixels_per_degree.filter(|_| self.is_ppd_given);
+        Ok(Viewed {
+            name: Some(profile.name().to_owned()),
+            pixels_per_degree: given.or_else(|| profile_ppd(&profile)),
+            finish: FinishConfig::new(mode, Some(&profile), refresh_interval),
+        })
+    }
+
     /// Names of the options that differ in `new` and that running streams cannot take over.
     #[must_use]
     pub fn needs_restart(&self, new: &Self) -> Vec<&'static str> {
@@ -393,7 +440,8 @@ impl Config {
             ("threads", self.threads != new.threads),
             ("ppd", self.pixels_per_degree != new.pixels_per_degree),
             ("finish", self.finish.mode != new.finish.mode),
-            ("profile", FinishConfig { mode: new.finish.mode, ..self.finish } != new.finish),
+            ("profile", self.profile != new.profile),
+            ("profiles", self.profiles != new.profiles),
             ("log", self.log != new.log),
             ("max-clients", self.max_clients != new.max_clients),
             ("memory-mb", self.memory_per_client != new.memory_per_client),
@@ -438,8 +486,11 @@ mod tests {
         Args { config: Some(file.path().to_owned()), ..flags(line) }.resolve()
     }
 
+    /// Folder of the built-in profiles, as somebody's own.
+    const PROFILES: &str = "../fixtures/profiles";
+
     /// Every option with a value that is not its default, by the name that flag and file share.
-    const EVERY_OPTION: [(&str, &str, &str); 18] = [
+    const EVERY_OPTION: [(&str, &str, &str); 19] = [
         ("socket", "/run/x", "'/run/x'"),
         ("sink", "png:out", "'png:out'"),
         ("fullscreen", "", "true"),
@@ -455,6 +506,7 @@ mod tests {
         ("ppd", "56", "56"),
         ("finish", "auto", "'auto'"),
         ("profile", "htc-vive", "'htc-vive'"),
+        ("profiles", PROFILES, "'../fixtures/profiles'"),
         ("log", "trace", "'trace'"),
         ("max-clients", "2", "2"),
         ("memory-mb", "64", "64"),
@@ -529,6 +581,43 @@ mod tests {
         assert_eq!(screen.finish.peak_cd_m2, Some(155.2));
         let both = flags("--profile asus-pg279q --ppd 70").resolve().unwrap();
         assert_eq!(both.pixels_per_degree, Some(70.0));
+    }
+
+    #[test]
+    fn the_profile_of_a_stream_wins_over_the_daemons_but_not_over_a_given_size() {
+        let vive = ProfileName::new("htc-vive").unwrap();
+        let config = flags("--profile asus-pg279q --finish on").resolve().unwrap();
+        let own = config.viewed(None).unwrap();
+        assert_eq!(
+            (own.name.as_deref(), own.finish.peak_cd_m2),
+            (Some("asus-pg279q"), Some(155.2))
+        );
+        let named = config.viewed(Some(&vive)).unwrap();
+        assert_eq!(named.name.as_deref(), Some("htc-vive"));
+        assert_ne!(named.finish, own.finish);
+        assert_eq!(named.finish.mode, own.finish.mode);
+        assert!(named.pixels_per_degree.is_some_and(|ppd| ppd < 30.0));
+        let given = flags("--ppd 70").resolve().unwrap().viewed(Some(&vive)).unwrap();
+        assert_eq!(given.pixels_per_degree, Some(70.0));
+        assert_eq!(given.finish.peak_cd_m2, named.finish.peak_cd_m2);
+        let error = config.viewed(Some(&ProfileName::new("crt").unwrap())).unwrap_err();
+        assert!(error.expected.contains("asus-pg279q"), "{error}");
+    }
+
+    #[test]
+    fn a_stream_may_name_the_file_that_the_user_gave() {
+        let file = "../fixtures/profiles/htc-vive.toml";
+        let text = fs::read_to_string(file).unwrap().replace("htc-vive", "mine");
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.toml");
+        fs::write(&path, text).unwrap();
+        let config = flags(&format!("--profile {}", path.display())).resolve().unwrap();
+        let mine = ProfileName::new("mine").unwrap();
+        assert_eq!(config.viewed(Some(&mine)).unwrap(), config.viewed(None).unwrap());
+        assert!(flags("").resolve().unwrap().viewed(Some(&mine)).is_err());
+        // A path is no name.
+        let hostile = ProfileName::new(&path.display().to_string()).unwrap();
+        assert!(config.viewed(Some(&hostile)).is_err());
     }
 
     #[test]

@@ -17,6 +17,7 @@ pub mod draw;
 pub mod gpu;
 pub mod hud;
 pub mod ingest;
+pub mod profiles;
 pub mod recorder;
 pub mod server;
 pub mod session;

@@ -5,6 +5,7 @@
 
 use crate::limits::{MAX_MOTION_SCALE, MAX_SIZE, MAX_WHITE_CD_M2};
 use crate::plane::{PlaneKind, PlaneMap, PlaneSize};
+use crate::profile::ProfileName;
 
 wire_enum! {
     /// How the channels of a colour plane are stored.
@@ -230,6 +231,9 @@ pub struct StreamFormat {
     pub ui: Option<ColorFormat>,
     /// One class per pixel, if the stream has any.
     pub mask: Option<MaskFormat>,
+    /// Display that the picture is for, if the client knows it better than the daemon. It wins over
+    /// the daemon's own; a name that the daemon does not know ends the stream.
+    pub display_profile: Option<ProfileName>,
 }
 
 impl StreamFormat {
@@ -248,6 +252,7 @@ impl StreamFormat {
             motion: None,
             ui: None,
             mask: None,
+            display_profile: None,
         }
     }
 

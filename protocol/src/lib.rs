@@ -22,6 +22,7 @@ pub mod limits;
 pub mod memory;
 pub mod message;
 pub mod plane;
+pub mod profile;
 pub mod slots;
 pub mod socket;
 mod text;
@@ -35,6 +36,7 @@ pub use format::{
 };
 pub use message::{Body, ClientMessage, DaemonMessage, MessageKind, Packet};
 pub use plane::{PlaneDescriptor, PlaneKind, PlaneMap, PlaneSize, Rect};
+pub use profile::ProfileName;
 pub use wire::camera::{Camera, LateCamera};
 pub use wire::feedback::{ErrorCode, ErrorMessage, Hint, Pacing, Presented, Statistics};
 pub use wire::handshake::{Clock, Features, GpuKind, Hello, PciAddress, Welcome};

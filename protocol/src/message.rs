@@ -117,7 +117,7 @@ pub trait Body: Sized {
     /// Type of the message.
     const KIND: MessageKind;
 
-    /// The body alone, without header or extensions. Each value has exactly one encoding.
+    /// The body and its extensions, without header. Each value has exactly one encoding.
     fn to_bytes(&self) -> Vec<u8>;
 
     /// Copies a body out of `bytes` and checks every field. Unknown optional extensions behind it
@@ -138,7 +138,9 @@ impl<T: Wire> Body for T {
     const KIND: MessageKind = <T as Wire>::KIND;
 
     fn to_bytes(&self) -> Vec<u8> {
-        self.to_raw().as_bytes().to_vec()
+        let mut bytes = self.to_raw().as_bytes().to_vec();
+        self.put_extensions(&mut bytes);
+        bytes
     }
 
     fn parse(bytes: &[u8]) -> Result<Self> {
@@ -146,8 +148,9 @@ impl<T: Wire> Body for T {
             let expected = format!("at least {} bytes", size_of::<T::Raw>());
             return Err(Error::field(T::KIND, "body", expected, bytes.len()));
         };
-        skip_extensions(T::KIND, tail)?;
-        T::from_raw(&raw)
+        let mut body = T::from_raw(&raw)?;
+        take_extensions(&mut body, tail)?;
+        Ok(body)
     }
 
     fn validate(&self) -> Result<()> {
@@ -155,11 +158,20 @@ impl<T: Wire> Body for T {
     }
 }
 
-/// Walks the extensions behind a body. This version knows none.
-fn skip_extensions(kind: MessageKind, mut tail: &[u8]) -> Result<()> {
+/// Appends an extension.
+pub(crate) fn put_extension(tag: u16, data: &[u8], bytes: &mut Vec<u8>) {
+    let length = u16::try_from(data.len()).expect("extensions are shorter than a packet");
+    let header = ExtensionRaw { tag: U16::new(tag), length: U16::new(length) };
+    bytes.extend_from_slice(header.as_bytes());
+    bytes.extend_from_slice(data);
+}
+
+/// Walks the extensions behind a body, which takes in those that it knows.
+fn take_extensions<T: Wire>(body: &mut T, mut tail: &[u8]) -> Result<()> {
     while !tail.is_empty() {
-        let fail =
-            |expected: &str, found: String| Err(Error::field(kind, "extension", expected, found));
+        let fail = |expected: &str, found: String| {
+            Err(Error::field(T::KIND, "extension", expected, found))
+        };
         let Ok((extension, rest)) = ExtensionRaw::read_from_prefix(tail) else {
             return fail("a tag and a length, 4 bytes", format!("{} bytes", tail.len()));
         };
@@ -167,7 +179,8 @@ fn skip_extensions(kind: MessageKind, mut tail: &[u8]) -> Result<()> {
         if length > rest.len() {
             return fail("a length inside the packet", format!("{length} of {}", rest.len()));
         }
-        if tag & EXTENSION_IS_CRITICAL != 0 {
+        let is_known = body.take_extension(tag, &rest[..length])?;
+        if !is_known && tag & EXTENSION_IS_CRITICAL != 0 {
             return fail("no critical extension that is unknown here", format!("tag {tag:#06x}"));
         }
         tail = &rest[length..];

@@ -11,8 +11,11 @@ mod samples;
 use std::path::PathBuf;
 
 use foreframe_protocol::message::HEADER_BYTES;
+use foreframe_protocol::wire::stream::DISPLAY_PROFILE_TAG;
 use foreframe_protocol::wire::struct_layouts;
-use foreframe_protocol::{ClientMessage, DaemonMessage, Error, MessageKind};
+use foreframe_protocol::{
+    Body, ClientMessage, CreateStream, DaemonMessage, Error, MessageKind, Packet, StreamFormat,
+};
 use packets::{client_packets, daemon_packets};
 
 /// Compares a file with what it should hold, or writes it.
@@ -47,7 +50,62 @@ fn valid_packets_are_those_of_this_layout() {
             same_or_blessed("valid", &format!("{side}_{name}.bin"), &packet);
         }
     }
-    assert_eq!(files_in("valid"), client_packets().len() + daemon_packets().len());
+    let extended = with_profile("asus-pg279q");
+    same_or_blessed("valid", "client_create_stream_display_profile.bin", &extended);
+    assert_eq!(files_in("valid"), client_packets().len() + daemon_packets().len() + 1);
+}
+
+/// The stream of the samples, with a display profile.
+fn with_profile(name: &str) -> Vec<u8> {
+    let mut stream = samples::stream();
+    stream.format.display_profile = Some(name.parse().expect("a name"));
+    Packet::new(&stream).as_bytes().to_vec()
+}
+
+/// The stream of the samples with these extensions behind it, by tag and data.
+fn extended(extensions: &[(u16, &[u8])]) -> Vec<u8> {
+    let mut body = samples::stream().to_bytes();
+    for (tag, data) in extensions {
+        body.extend(tag.to_le_bytes());
+        body.extend(u16::try_from(data.len()).expect("short").to_le_bytes());
+        body.extend(*data);
+    }
+    Packet::from_body_bytes(MessageKind::CreateStream, &body).as_bytes().to_vec()
+}
+
+/// Display profiles that no daemon looks up.
+fn bad_profiles() -> Vec<(String, Vec<u8>)> {
+    let tag = DISPLAY_PROFILE_TAG;
+    [
+        ("not_utf8", extended(&[(tag, &[b'a', 0xff])])),
+        ("control", extended(&[(tag, b"a\nb")])),
+        ("empty", extended(&[(tag, b"")])),
+        ("65_bytes", extended(&[(tag, &[b'a'; 65])])),
+        ("twice", extended(&[(tag, b"a"), (tag, b"a")])),
+    ]
+    .map(|(fault, packet)| (format!("create_stream-display_profile-{fault}"), packet))
+    .into()
+}
+
+#[test]
+fn a_display_profile_comes_back_and_others_skip_what_they_do_not_know() {
+    let parsed = |packet: &[u8]| match ClientMessage::parse(packet) {
+        Ok(ClientMessage::CreateStream(create)) => create,
+        other => panic!("{other:?}"),
+    };
+    let plain = parsed(&extended(&[]));
+    assert_eq!(plain.format.display_profile, None);
+    let named = parsed(&with_profile("asus-pg279q"));
+    assert_eq!(named.format.display_profile.map(|it| it.to_string()).unwrap(), "asus-pg279q");
+    // Without the name it is the same stream: what a daemon sees that does not know the tag.
+    let format = StreamFormat { display_profile: None, ..named.format };
+    assert_eq!(CreateStream { format, ..named }, plain);
+    assert_eq!(parsed(&extended(&[(0x7fff, b"later")])), plain);
+    assert_eq!(
+        parsed(&extended(&[(1, &[b'a'; 64])])).to_bytes(),
+        extended(&[(1, &[b'a'; 64])])[16..]
+    );
+    assert!(ClientMessage::parse(&extended(&[(0x8001, b"critical")])).is_err());
 }
 
 fn field(layout: &str, name: &str) -> (usize, usize) {
@@ -240,6 +298,7 @@ fn refused(packet: &[u8]) -> Option<Error> {
 #[test]
 fn invalid_packets_say_what_was_expected_and_found() {
     let mut cases = bad_headers();
+    cases.extend(bad_profiles());
     for (sample, path, fault, bytes) in bad_fields() {
         let name = format!("{sample}-{}-{fault}", path.replace('.', "-"));
         cases.push((name, patched(sample, path, &bytes)));

@@ -460,3 +460,25 @@ fn a_client_whose_picture_stands_still_is_told_to_render_it_whole_and_no_oftener
     assert_eq!((hint.stream, hint.width, hint.height), (1, 64, 32));
     assert_eq!(hint.key_interval_ns, 20_000_000, "nothing moves: no more than the least rate");
 }
+
+#[test]
+fn a_stream_is_shown_for_the_display_it_names_and_an_unknown_one_ends_it_alone() {
+    let daemon = RunningDaemon::start("shm");
+    let mut client = daemon.connect();
+    let mut source = client.open_stream(1, 8, 8);
+    let named = |name: &str| StreamFormat {
+        display_profile: Some(name.parse().unwrap()),
+        ..StreamFormat::rgba8(8, 8)
+    };
+    let format = named("/etc/passwd.toml");
+    client.send(CreateStream { stream: 2, format, max_sizes: format.full_sizes(), slots: 3 });
+    let error = client.expect_error();
+    assert!(error.code == ErrorCode::Unsupported && !error.is_fatal, "{error:?}");
+    assert_eq!((error.stream, error.found.as_str()), (Some(2), "/etc/passwd.toml"));
+    assert!(error.expected.contains("asus-pg279q"), "{error:?}");
+    let submit = client.submit(&mut source, RED);
+    client.expect_presented(&submit);
+    let mut headset = client.open_stream_of(3, named("htc-vive"));
+    let submit = client.submit(&mut headset, RED);
+    client.expect_presented(&submit);
+}

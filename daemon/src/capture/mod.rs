@@ -38,7 +38,9 @@ pub use layout::pixel_layout;
 pub use reader::{Capture, CapturedFrame, CapturedPlane, FrameTimes};
 pub use record::PlaneInfo;
 pub use schema::VERSION;
-pub use session::{CaptureSource, DISPLAY_ORIGIN, Gap, PIXELS_PER_DEGREE, SessionInfo};
+pub use session::{
+    CaptureSource, DISPLAY_ORIGIN, Gap, PIXELS_PER_DEGREE, PIXELS_PER_DEGREE_IS_GIVEN, SessionInfo,
+};
 pub use source::ReadAt;
 pub use ui_plane::CapturedUi;
 pub use writer::CaptureWriter;

@@ -10,6 +10,10 @@ use super::schema;
 /// Name of the setting that a replay needs to see what was seen: pixels per degree of visual angle.
 pub const PIXELS_PER_DEGREE: &str = "pixels_per_degree";
 
+/// Name of the setting that says whether the user gave that number (`true`), so that it held for
+/// streams that named a display profile too.
+pub const PIXELS_PER_DEGREE_IS_GIVEN: &str = "pixels_per_degree_is_given";
+
 /// Name of the setting that says where refreshes of the display lay: an instant of one, nanoseconds
 /// of the monotonic clock.
 pub const DISPLAY_ORIGIN: &str = "display_origin_ns";

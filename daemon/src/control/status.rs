@@ -46,6 +46,9 @@ pub struct StreamStatus {
     pub backend: String,
     /// What says when its frames are shown: `timer`, `presentation feedback`, `frame callbacks`.
     pub paced_by: String,
+    /// Name of the display profile that it is for; None where nobody named one.
+    #[serde(default)]
+    pub display: Option<String>,
     /// No key has come for a while, and nothing is made.
     pub is_idle: bool,
     /// Refreshes and keys per second.

@@ -95,6 +95,7 @@ impl Server {
             session: stream.session,
             width: stream.create.format.width,
             height: stream.create.format.height,
+            display: stream.display.clone(),
             is_idle: stream.reported_at.is_none_or(|at| now - at > IDLE_AFTER),
             ..stream.report.clone()
         });

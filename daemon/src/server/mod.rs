@@ -33,7 +33,9 @@ use foreframe_protocol::socket::{Listener, default_socket_path};
 use foreframe_protocol::{EndReason, Features, Goodbye};
 use tracing::{info, warn};
 
-use crate::capture::{CaptureSource, DISPLAY_ORIGIN, PIXELS_PER_DEGREE, SessionInfo};
+use crate::capture::{
+    CaptureSource, DISPLAY_ORIGIN, PIXELS_PER_DEGREE, PIXELS_PER_DEGREE_IS_GIVEN, SessionInfo,
+};
 use crate::clock;
 use crate::config::{Args, Config, SinkSpec};
 use crate::gpu::Gpus;
@@ -314,7 +316,9 @@ fn session_info(config: &Config, display_origin: MonoTime) -> SessionInfo {
     let name = config.record.as_deref().map(stem).unwrap_or_default();
     let session = SessionInfo::new(name, CaptureSource::Live);
     let session = match config.pixels_per_degree {
-        Some(ppd) => session.with_config(PIXELS_PER_DEGREE, ppd),
+        Some(ppd) => session
+            .with_config(PIXELS_PER_DEGREE, ppd)
+            .with_config(PIXELS_PER_DEGREE_IS_GIVEN, config.is_ppd_given),
         None => session,
     };
     session

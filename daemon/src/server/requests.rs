@@ -16,6 +16,7 @@ use foreframe_protocol::{
 
 use super::streams::{Pool, stream_cost};
 use super::{MAX_STREAMS, Server};
+use crate::profiles::UnknownProfile;
 use crate::session::Session;
 use crate::session::fault::Fault;
 use crate::stream::mailbox::{Submission, UiSubmission};
@@ -94,13 +95,20 @@ impl Server {
                 Fault::fatal(ErrorCode::Unsupported, "create_stream.ui_format", expected, ui);
             return Err(fault.tolerated().of_stream(number));
         }
+        let viewed = self.config.viewed(format.display_profile.as_ref()).map_err(|unknown| {
+            let UnknownProfile { expected, found } = unknown;
+            let field = "create_stream.display_profile";
+            let fault = Fault::fatal(ErrorCode::Unsupported, field, expected, found);
+            fault.tolerated().of_stream(number)
+        })?;
+        let session = self.open_session(id)?;
         let cost = stream_cost(create);
         if session.cost.saturating_add(cost) > memory_per_client {
             let fault = quota_fault("create_stream", memory_per_client, session.cost, cost);
             return Err(fault.tolerated().of_stream(number));
         }
         session.cost += cost;
-        match self.start_stream(id, create, cost) {
+        match self.start_stream(id, create, viewed, cost) {
             Ok(ordinal) => {
                 let session = self.open_session(id)?;
                 session.streams.insert(number, ordinal);

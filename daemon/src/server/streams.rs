@@ -17,6 +17,7 @@ use super::Server;
 use crate::clock::{self, Waker};
 use crate::control::StreamStatus;
 use crate::ingest::{self, KeyOrder};
+use crate::profiles::Viewed;
 use crate::session::fault::Fault;
 use crate::sink::Sink;
 use crate::sink::window::{WindowConfig, WindowOpener, WindowSystem};
@@ -46,6 +47,8 @@ pub(super) struct Stream {
     /// What it reported last, and when.
     pub(super) report: StreamStatus,
     pub(super) reported_at: Option<MonoTime>,
+    /// Name of the display that it is for.
+    pub(super) display: Option<String>,
     /// There once it has been told to end.
     end: Option<EndReason>,
     thread: Option<JoinHandle<()>>,
@@ -92,6 +95,7 @@ impl Server {
         &mut self,
         session: u32,
         create: &CreateStream,
+        viewed: Viewed,
         cost: u64,
     ) -> anyhow::Result<u64> {
         let ordinal = self.next_ordinal;
@@ -115,8 +119,8 @@ impl Server {
             create: *create,
             core: CoreConfig {
                 engine: EngineConfig {
-                    pixels_per_degree: config.pixels_per_degree,
-                    finish: config.finish,
+                    pixels_per_degree: viewed.pixels_per_degree,
+                    finish: viewed.finish,
                     keys_to_check: KEYS_TO_CHECK,
                     timer: clock::now,
                     worker_started: thread::ask_for_real_time_work,
@@ -149,6 +153,7 @@ impl Server {
                 pool: None,
                 cost,
                 report: StreamStatus::default(),
+                display: viewed.name,
                 reported_at: None,
                 end: None,
                 thread: Some(thread),

@@ -7,6 +7,7 @@ use crate::recorder::StreamRecorder;
 
 /// A change that the stream's thread makes before it does anything else.
 #[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "commands are rare, and moved once or twice")]
 pub enum StreamCommand {
     /// Make in-between frames by this method from the next picture on.
     Method(Method),

@@ -31,6 +31,12 @@ pub(crate) trait Wire: Sized {
     fn to_raw(&self) -> Self::Raw;
     /// Checks every field.
     fn from_raw(raw: &Self::Raw) -> Result<Self>;
+    /// Appends the extensions that this value needs.
+    fn put_extensions(&self, _bytes: &mut Vec<u8>) {}
+    /// Takes in an extension; false where this message has none of this tag.
+    fn take_extension(&mut self, _tag: u16, _data: &[u8]) -> Result<bool> {
+        Ok(false)
+    }
 }
 
 /// Layout of every struct that stands in a packet, for tests of the documentation.

@@ -8,8 +8,9 @@ use super::session::EndReason;
 use crate::error::Result;
 use crate::format::{ColorFormat, DepthConvention, MaskFormat, MotionConvention, StreamFormat};
 use crate::limits::{MAX_PLANE_RATIO, MAX_SIZE, MAX_SLOTS, MIN_SLOTS};
-use crate::message::MessageKind;
+use crate::message::{MessageKind, put_extension};
 use crate::plane::{PlaneKind, PlaneMap, PlaneSize};
+use crate::profile::ProfileName;
 
 wire_struct! {
     /// See [`PlaneSize`].
@@ -68,6 +69,10 @@ wire_struct! {
         4 reason: U32,
     }
 }
+
+/// Tag of the extension of [`CreateStream`] that names a display profile. Not critical: a daemon that
+/// does not know it shows the stream as on its own display.
+pub const DISPLAY_PROFILE_TAG: u16 = 1;
 
 /// A new stream.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -234,6 +239,7 @@ impl Wire for CreateStream {
                 none if none == 0 => None,
                 code => Some(check.coded("mask_format", code)?),
             },
+            display_profile: None,
         };
         if let Some((field, expected, found)) = format.first_fault() {
             return check.fail(field, expected, found);
@@ -246,6 +252,24 @@ impl Wire for CreateStream {
             max_sizes: max_sizes(check, &format, &raw.max_sizes)?,
             slots,
         })
+    }
+
+    fn put_extensions(&self, bytes: &mut Vec<u8>) {
+        if let Some(name) = &self.format.display_profile {
+            put_extension(DISPLAY_PROFILE_TAG, name.as_str().as_bytes(), bytes);
+        }
+    }
+
+    fn take_extension(&mut self, tag: u16, data: &[u8]) -> Result<bool> {
+        if tag != DISPLAY_PROFILE_TAG {
+            return Ok(false);
+        }
+        if let Some(first) = self.format.display_profile {
+            let found = format!("another after {first}");
+            return Check(Self::KIND).fail(ProfileName::FIELD, "one name", found);
+        }
+        self.format.display_profile = Some(ProfileName::from_bytes(data)?);
+        Ok(true)
     }
 }
 

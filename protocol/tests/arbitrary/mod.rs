@@ -33,6 +33,11 @@ fn motion() -> impl Strategy<Value = MotionConvention> {
         })
 }
 
+/// Any name, of up to 16 characters of up to 4 bytes each.
+fn profile_name() -> impl Strategy<Value = ProfileName> {
+    "[^\\pC]{1,16}".prop_map(|name| ProfileName::new(&name).expect("at most 64 bytes of text"))
+}
+
 prop_compose! {
     /// Any stream that may be asked for.
     pub(crate) fn any_stream()(
@@ -49,10 +54,11 @@ prop_compose! {
         mask in proptest::option::of(coded(MaskFormat::ALL)),
         ratio in 1.0..=4.0_f64,
         slots in 1..=8_u32,
+        display_profile in proptest::option::of(profile_name()),
     ) -> CreateStream {
         let format = StreamFormat {
             width, height, color, transfer, primaries, white_cd_m2, valid_rect_use, depth, motion,
-            ui, mask,
+            ui, mask, display_profile,
         };
         let mut max_sizes = format.full_sizes();
         let over = |size: u32| (f64::from(size) / ratio).round().max(1.0) as u32;

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use anyhow::{Context as _, bail};
 use foreframe_engine::backend::choice::BackendChoice;
 use foreframe_engine::{FinishConfig, FinishMode, Method, MonoSpan};
-use foreframed::config::{SinkSpec, profile_ppd, read_profile};
+use foreframed::config::SinkSpec;
 use foreframed::gpu;
 use foreframed::sink::Sink;
 use serde::Serialize;
@@ -17,6 +17,7 @@ use crate::options::{number, parse_count};
 use crate::output::Output;
 use crate::recording::Recording as _;
 use crate::recording::capture::CaptureRecording;
+use crate::recording::display::DisplayOptions;
 use crate::recording::keys::KeyReader;
 use crate::recording::plan::Plan;
 use crate::virtual_time::digest::FrameDigester;
@@ -57,9 +58,14 @@ pub struct Args {
     #[arg(allow_negative_numbers = true)]
     pub least_step: f64,
     /// Display that the output is for: a built-in profile (see `perception displays`) or a file
-    /// that ends in .toml. Without --ppd it gives that too, from 65 cm before a screen.
+    /// that ends in .toml. Without --ppd it gives that too, from 65 cm before a screen. It wins over
+    /// the one that the application named [default: that one]
     #[arg(long, value_name = "NAME")]
     pub profile: Option<String>,
+    /// Folder of display profiles, files that end in .toml, that the capture may name beside the
+    /// built-in ones.
+    #[arg(long, value_name = "DIR")]
+    pub profiles: Option<PathBuf>,
     /// Take every N-th frame as a key, from frame 0, and leave out the others.
     #[arg(long, value_name = "N", default_value = "1", value_parser = parse_count)]
     #[arg(allow_negative_numbers = true)]
@@ -126,23 +132,19 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
     let reader = KeyReader::new(recording.format(), &plan)?;
     let refresh_interval = MonoSpan::from_hz(args.refresh);
     let timing = if args.step { KeyTiming::Stepped } else { KeyTiming::AsRecorded };
-    let profile = args.profile.as_deref().map(read_profile).transpose()?;
-    let profile = profile.as_ref();
+    let said = DisplayOptions::read(args.profile.as_deref(), args.profiles.as_deref())?;
+    #[expect(clippy::cast_possible_truncation, reason = "a number of 1 to 1000")]
+    let ppd = args.ppd.map(|ppd| ppd as f32);
+    let display = DisplayOptions { pixels_per_degree: ppd, ..said }.of(&recording)?;
     let config = ReplayConfig {
         method: args.method,
         gpu: gpu::open(&args.backend).context("--backend")?,
         threads: args.threads.unwrap_or_else(all_processors),
         refresh_interval,
         display_origin: if args.step { None } else { recording.display_origin()? },
-        pixels_per_degree: match args.ppd {
-            #[expect(clippy::cast_possible_truncation, reason = "a number of 1 to 1000")]
-            Some(ppd) => Some(ppd as f32),
-            None => {
-                profile.map_or_else(|| recording.pixels_per_degree(), |it| Ok(profile_ppd(it)))?
-            }
-        },
+        pixels_per_degree: display.pixels_per_degree,
         late_cameras: timed_poses(&recording.late_cameras(), recording.heads(), &plan, timing),
-        finish: FinishConfig::new(args.finish, profile, refresh_interval),
+        finish: FinishConfig::new(args.finish, display.profile.as_ref(), refresh_interval),
         #[expect(clippy::cast_possible_truncation, reason = "a number of 0 to 16")]
         least_step_px: args.least_step as f32,
     };

@@ -9,7 +9,6 @@ use anyhow::Context as _;
 use foreframe_engine::backend::choice::BackendChoice;
 use foreframe_engine::backend::gpu::Gpu;
 use foreframe_engine::{FinishConfig, FinishMode, Method, MonoSpan};
-use foreframed::config::read_profile;
 use foreframed::{clock, gpu};
 
 use super::plot;
@@ -17,6 +16,7 @@ use crate::options::{number, parse_count, parse_ratio};
 use crate::output::Output;
 use crate::recording::Recording as _;
 use crate::recording::capture::CaptureRecording;
+use crate::recording::display::DisplayOptions;
 use crate::score::chart::chart;
 use crate::score::page::{frames_to_keep, page};
 use crate::score::report::Report;
@@ -55,9 +55,13 @@ pub struct Args {
     #[arg(long)]
     pub retina: bool,
     /// Display that frames are finished for: a built-in profile (see `perception displays`) or a
-    /// file that ends in .toml.
+    /// file that ends in .toml. It wins over the one that the application named [default: that one]
     #[arg(long, value_name = "NAME")]
     pub profile: Option<String>,
+    /// Folder of display profiles, files that end in .toml, that a capture may name beside the
+    /// built-in ones.
+    #[arg(long, value_name = "DIR")]
+    pub profiles: Option<PathBuf>,
     /// Refresh rate that `--finish auto` is for, 1 to 1000.
     #[arg(long, value_name = "HZ", default_value_t = 120.0, value_parser = number(1.0, 1000.0))]
     #[arg(allow_negative_numbers = true)]
@@ -79,11 +83,11 @@ pub struct Methods(pub Vec<Method>);
 /// # Errors
 /// If a capture cannot be read.
 pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
-    let profile = args.profile.as_deref().map(read_profile).transpose()?;
+    let said = DisplayOptions::read(args.profile.as_deref(), args.profiles.as_deref())?;
     let refresh_interval = MonoSpan::from_hz(args.refresh);
-    let options = ScoreOptions {
+    let mut options = ScoreOptions {
         retina: args.retina,
-        finish: FinishConfig::new(args.finish, profile.as_ref(), refresh_interval),
+        finish: FinishConfig::default(),
         methods: args.methods.0.clone(),
         ratio: args.ratio,
         backends: args
@@ -117,6 +121,11 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
     for (path, recording) in &mut recordings {
         let name = recording.name().to_owned();
         progress.set_message(format!("scoring {name}"));
+        if args.finish != FinishMode::Off {
+            let display = said.of(recording).with_context(|| path.display().to_string())?;
+            let profile = display.profile.as_ref();
+            options.finish = FinishConfig::new(args.finish, profile, refresh_interval);
+        }
         let score = score_recording(&name, recording, &options, || progress.inc(1))
             .with_context(|| format!("scoring {}", path.display()))?;
         scores.push(score);

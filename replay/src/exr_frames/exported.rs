@@ -56,6 +56,9 @@ pub struct FormatText {
     pub ui: Option<String>,
     /// How the mask is stored.
     pub mask: Option<String>,
+    /// Display that the picture is for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub display_profile: Option<String>,
 }
 
 /// A motion convention by name.
@@ -126,6 +129,7 @@ impl FormatText {
             }),
             ui: format.ui.map(|ui| ui.name().to_owned()),
             mask: format.mask.map(|mask| mask.name().to_owned()),
+            display_profile: format.display_profile.map(|name| name.to_string()),
         }
     }
 
@@ -163,6 +167,7 @@ impl FormatText {
             motion,
             ui: self.ui.as_deref().map(|name| named!(ColorFormat, name)).transpose()?,
             mask: self.mask.as_deref().map(|name| named!(MaskFormat, name)).transpose()?,
+            display_profile: self.display_profile.as_deref().map(str::parse).transpose()?,
         })
     }
 }

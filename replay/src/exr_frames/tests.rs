@@ -86,6 +86,7 @@ fn formats() -> Vec<StreamFormat> {
             transfer: Transfer::Pq,
             primaries: Primaries::Bt2020,
             valid_rect_use: ValidRectUse::Stretch,
+            display_profile: Some("htc-vive".parse().unwrap()),
             depth: depth(DepthFormat::U16, DepthMeaning::Standard),
             ..plain
         },

@@ -9,9 +9,10 @@ use std::sync::Arc;
 
 use anyhow::Context as _;
 use foreframe_engine::{KeyInput, MonoTime, PlaneInput, StreamFormat};
-use foreframe_protocol::{PlaneDescriptor, PlaneKind, Submit};
+use foreframe_protocol::{PlaneDescriptor, PlaneKind, ProfileName, Submit};
 use foreframed::capture::{
-    Capture, CaptureInfo, CapturedPlane, DISPLAY_ORIGIN, PIXELS_PER_DEGREE, PlaneInfo, ReadAt,
+    Capture, CaptureInfo, CapturedPlane, DISPLAY_ORIGIN, PIXELS_PER_DEGREE,
+    PIXELS_PER_DEGREE_IS_GIVEN, PlaneInfo, ReadAt,
 };
 use foreframed::ingest::{self, PlaneSource};
 
@@ -110,6 +111,19 @@ impl<S: ReadAt> CaptureRecording<S> {
             format!("{PIXELS_PER_DEGREE} of the session: expected 1 to 1000, found `{text}`")
         })?;
         Ok(Some(ppd))
+    }
+
+    /// Whether the user of the daemon gave that size, so that it held for every display.
+    #[must_use]
+    pub fn is_ppd_given(&self) -> bool {
+        let config = &self.capture.session().config;
+        config.get(PIXELS_PER_DEGREE_IS_GIVEN).is_some_and(|text| text == "true")
+    }
+
+    /// The display that the application named for its picture.
+    #[must_use]
+    pub fn display_profile(&self) -> Option<ProfileName> {
+        self.capture.streams()[self.stream].format.display_profile
     }
 
     /// A refresh of the display that the daemon worked with when it recorded. None where the

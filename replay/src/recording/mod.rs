@@ -8,6 +8,7 @@
 
 pub mod capture;
 pub mod compose;
+pub mod display;
 pub mod keys;
 #[cfg(test)]
 pub(crate) mod memory;

@@ -45,7 +45,10 @@ pub fn headline(status: &DaemonStatus) -> String {
 pub fn title(stream: &StreamStatus) -> String {
     let StreamStatus { number, width, height, method, backend, paced_by, .. } = stream;
     let idle = if stream.is_idle { ", idle" } else { "" };
-    format!("stream {number}: {width}x{height}, {method} on {backend}, paced by {paced_by}{idle}")
+    let display = stream.display.as_ref().map_or(String::new(), |name| format!(", for {name}"));
+    format!(
+        "stream {number}: {width}x{height}, {method} on {backend}, paced by {paced_by}{display}{idle}"
+    )
 }
 
 /// The stages of latency by name.
