@@ -101,6 +101,7 @@ pub fn stream_format(format: &protocol::StreamFormat) -> engine::StreamFormat {
         valid_rect_use: match format.valid_rect_use {
             protocol::ValidRectUse::Letterbox => convention::ValidRectUse::Letterbox,
             protocol::ValidRectUse::Stretch => convention::ValidRectUse::Stretch,
+            protocol::ValidRectUse::Multiplex => convention::ValidRectUse::Multiplex,
         },
         depth: format.depth.map(depth),
         motion: format.motion.map(motion),

@@ -50,6 +50,9 @@ wire_enum! {
         Letterbox = 1 "letterbox",
         /// Dynamic resolution: the rectangle is stretched to the whole output.
         Stretch = 2 "stretch",
+        /// Temporal resolution multiplexing: a smaller rectangle is a reduced picture, stretched,
+        /// and the pictures in full that take turns with such make up for what they lack.
+        Multiplex = 3 "multiplex",
     }
 }
 

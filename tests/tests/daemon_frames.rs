@@ -10,8 +10,8 @@ use daemon_fixture::{Client, KeySource, RunningDaemon, Screen};
 use foreframe_protocol::{
     CameraMotion, ColorFormat, CreateStream, DaemonMessage, DestroyStream, EndReason, ErrorCode,
     ErrorMessage, Goodbye, LateCamera, MotionConvention, MotionDirection, MotionFormat, MotionUnit,
-    OutputKind, OutputReleased, PlaneDescriptor, PlaneKind, PlaneSize, ReleaseReason, StreamFormat,
-    UiPlane,
+    OutputKind, OutputReleased, PlaneDescriptor, PlaneKind, PlaneSize, Rect, ReleaseReason,
+    StreamFormat, UiPlane, ValidRectUse,
 };
 use foreframe_replay::recording::Recording as _;
 use foreframe_replay::recording::capture::CaptureRecording;
@@ -43,6 +43,42 @@ fn a_subscriber_sees_the_keys_of_its_own_stream_as_they_are() {
         client.expect_presented(&submit);
         client.send(OutputReleased { pool: frame.pool, slot: frame.slot });
     }
+}
+
+#[test]
+fn a_reduced_key_between_full_ones_is_shown_at_full_size_and_made_up_for() {
+    let daemon = RunningDaemon::start("shm");
+    let mut client = daemon.connect();
+    let format =
+        StreamFormat { valid_rect_use: ValidRectUse::Multiplex, ..StreamFormat::rgba8(32, 8) };
+    let mut source = client.open_stream_of(1, format);
+    let screen = client.subscribe(1, 3);
+    // Lines in light and dark grey, and what is left of them at half the size.
+    let lines: Vec<u8> = (0..32 * 8).flat_map(|i| [[180, 60][i % 2]; 4]).collect();
+    let mut shown = Vec::new();
+    for is_full in [true, false, true] {
+        let mut submit = source.fill([120; 4]);
+        if is_full {
+            source.slots[submit.slot as usize][..lines.len()].copy_from_slice(&lines);
+        } else if let Some(color) = submit.planes.get_mut(PlaneKind::Color) {
+            color.valid = Rect { x: 0, y: 0, width: 16, height: 4 };
+        }
+        client.send(submit);
+        let frame = loop {
+            let frame = client.expect_frame(&screen);
+            if frame.key_index == submit.key_index {
+                break frame;
+            }
+            client.send(OutputReleased { pool: frame.pool, slot: frame.slot });
+        };
+        shown.push(screen.pixels(&frame));
+        client.expect_presented(&submit);
+        client.send(OutputReleased { pool: frame.pool, slot: frame.slot });
+    }
+    assert_eq!(shown[0], lines, "the first has nobody to make up for");
+    assert_eq!(shown[1], [120; 4].repeat(32 * 8), "the whole picture");
+    let middle = &shown[2][(4 * 32 + 16) * 4..][..8];
+    assert!(middle[0] > 200 && middle[4] < 20, "twice the contrast: {middle:?}");
 }
 
 #[test]

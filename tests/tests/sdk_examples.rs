@@ -78,6 +78,7 @@ fn the_applications_run_to_their_end_and_nothing_is_refused() {
         "sdk_02_depth_and_motion",
         "sdk_03_dynamic_resolution",
         "sdk_06_user_interface",
+        "sdk_07_multiplexing",
     ];
     let children = names.map(|name| (name, daemon.run(name)));
     let [first, second, ..] = children.map(|(name, child)| ended(name, child));

@@ -74,6 +74,14 @@ pub trait Texel: Copy + Default + PartialEq + Send + Sync + 'static {
     #[must_use]
     fn mix(a: Self, b: Self, weight: u32) -> Self;
 
+    /// Red, green, blue, alpha.
+    #[must_use]
+    fn channels(self) -> [u16; 4];
+
+    /// The pixel of these channels, each of which fits its bits.
+    #[must_use]
+    fn of_channels(channels: [u16; 4]) -> Self;
+
     /// How bright it is, in steps of the format: about a quarter red, half green, a quarter blue.
     #[must_use]
     fn luma(self) -> i32;
@@ -144,6 +152,17 @@ fn packed_luma(word: u32, fields: [(u32, u32); 4]) -> i32 {
 }
 
 impl Texel for Rgba8 {
+    #[inline(always)]
+    fn channels(self) -> [u16; 4] {
+        self.0.to_le_bytes().map(u16::from)
+    }
+
+    #[inline(always)]
+    fn of_channels(channels: [u16; 4]) -> Self {
+        let [r, g, b, a] = channels.map(u32::from);
+        Self(r | g << 8 | b << 16 | a << 24)
+    }
+
     #[inline]
     fn luma(self) -> i32 {
         packed_luma(self.0, RGBA8_FIELDS)
@@ -201,6 +220,17 @@ impl Texel for Rgba8 {
 }
 
 impl Texel for Rgb10a2 {
+    #[inline(always)]
+    fn channels(self) -> [u16; 4] {
+        [0, 10, 20, 30].map(|shift| (self.0 >> shift & 0x3ff) as u16)
+    }
+
+    #[inline(always)]
+    fn of_channels(channels: [u16; 4]) -> Self {
+        let [r, g, b, a] = channels.map(u32::from);
+        Self(r | g << 10 | b << 20 | a << 30)
+    }
+
     fn luma(self) -> i32 {
         packed_luma(self.0, RGB10A2_FIELDS)
     }
@@ -221,6 +251,16 @@ impl Texel for Rgb10a2 {
 }
 
 impl Texel for OrderedRgba16 {
+    #[inline(always)]
+    fn channels(self) -> [u16; 4] {
+        self.0
+    }
+
+    #[inline(always)]
+    fn of_channels(channels: [u16; 4]) -> Self {
+        Self(channels)
+    }
+
     /// Of the ordered integers: about the logarithm of light.
     fn luma(self) -> i32 {
         let [red, green, blue, _] = self.0.map(i32::from);

@@ -20,6 +20,7 @@ use crate::finish::{Finish, FinishConfig};
 use crate::format::{DepthMeaning, StreamFormat};
 use crate::key::{KeyFrame, KeyInput};
 use crate::method::Method;
+use crate::multiplex::Multiplex;
 use crate::phase::Phase;
 use crate::simd::Simd;
 use crate::time::{MonoSpan, MonoTime};
@@ -133,6 +134,8 @@ pub struct Engine {
     backend: Backend,
     /// Of streams whose pictures are finished.
     finish: Option<Finish>,
+    /// Of streams that send reduced keys in between.
+    multiplex: Option<Multiplex>,
     ui: UiLayer,
     check: MotionCheck,
 }
@@ -147,8 +150,14 @@ struct Scratch {
 
 impl Engine {
     /// An engine for one stream. It starts its threads now, fewer where the system gives fewer.
+    ///
+    /// Pictures of a stream that multiplexes are not finished, whatever `config` says: its keys move
+    /// their detail about already.
     #[must_use]
     pub fn new(format: StreamFormat, config: EngineConfig) -> Self {
+        let multiplex = Multiplex::new(&format, &config.finish);
+        let finishes = multiplex.is_none();
+        let finish = Finish::new(&format, &config.finish, config.pixels_per_degree);
         Self {
             format,
             config,
@@ -159,7 +168,8 @@ impl Engine {
             scratch: Scratch::default(),
             ladder: Ladder::new(config.method, config.pixels_per_degree),
             backend: Backend::default(),
-            finish: Finish::new(&format, &config.finish, config.pixels_per_degree),
+            finish: finish.filter(|_| finishes),
+            multiplex,
             ui: UiLayer::default(),
             check: MotionCheck::new(&format, config.keys_to_check),
         }
@@ -260,6 +270,11 @@ impl Engine {
             &mut self.spare,
         )?;
         let mut key = std::mem::take(&mut self.spare);
+        if let Some(multiplex) = &mut self.multiplex {
+            let from = self.scratch.decode.reduced_color();
+            let reduced = noticed.reduced.map(|part| (from, part));
+            multiplex.take_key(&self.pool, reduced, self.newest.as_ref(), &mut key);
+        }
         if let Some(older) = self.newest.as_ref().filter(|_| key.motion_from.is_some()) {
             let displacement = self.scratch.decode.displacement();
             self.check.look(&self.format, &key, displacement, older);

@@ -147,6 +147,9 @@ pub enum ValidRectUse {
     Letterbox,
     /// Dynamic resolution: the rectangle is stretched to the whole output.
     Stretch,
+    /// Temporal resolution multiplexing ([`crate::multiplex`]): a key whose rectangle is smaller is
+    /// a reduced one, and those that take turns with such keys make up for what it lacks.
+    Multiplex,
 }
 
 /// Everything that stays the same for all key frames of a stream.

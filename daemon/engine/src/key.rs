@@ -163,6 +163,9 @@ pub struct KeyFrame {
     pub is_cut: bool,
     /// Colour, at the size of the output.
     pub color: ColorPlane,
+    /// What is compared with the keys before and after where `color` alternates with them
+    /// ([`crate::multiplex`]); empty where it is `color`.
+    pub steady: ColorPlane,
     /// The part of `color` that moves; the rest is shown as it is.
     pub valid: Rect,
     /// Depth key per cell of the field grid, larger is nearer. Empty without a depth plane.
@@ -192,6 +195,12 @@ pub struct KeyFrame {
 }
 
 impl KeyFrame {
+    /// The picture that other keys of the stream are compared with.
+    #[must_use]
+    pub fn compared(&self) -> &ColorPlane {
+        if self.steady.width() == 0 { &self.color } else { &self.steady }
+    }
+
     /// Time that the motion field spans; None where there is no usable motion.
     #[must_use]
     pub fn motion_span(&self) -> Option<MonoSpan> {

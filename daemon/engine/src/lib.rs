@@ -30,6 +30,7 @@ pub mod key;
 mod lanes;
 pub mod mask;
 pub mod method;
+pub mod multiplex;
 pub mod pacing;
 pub mod params;
 pub mod phase;

@@ -3,6 +3,7 @@
 //! Fixed memory, a few additions per picture; percentiles are worked out only when a report is due.
 
 use foreframe_engine::{MonoSpan, MonoTime};
+use foreframe_protocol::ValidRectUse;
 
 use super::core::FrameCounts;
 use crate::control::{Rates, Spread, Stages};
@@ -11,6 +12,25 @@ use crate::control::{Rates, Spread, Stages};
 const KEPT: usize = 128;
 /// Upper bounds of the classes of headroom but the last, milliseconds.
 const HEADROOM_MS: [f64; 5] = [0.0, 1.0, 2.0, 4.0, 8.0];
+
+/// Keys per second from which on full and reduced ones in turn are seen as one picture (Denes 2020,
+/// section 5.2.1).
+const FUSED_HZ: f64 = 90.0;
+/// A measured rate may be that much lower.
+const RATE_ERROR: f64 = 0.05;
+
+/// What is to be said of a stream whose full and reduced keys can be told apart.
+#[must_use]
+pub fn alternation(valid_rect_use: ValidRectUse, keys_hz: f64) -> Option<String> {
+    let is_seen = keys_hz > 0.0 && keys_hz < FUSED_HZ * (1.0 - RATE_ERROR);
+    (valid_rect_use == ValidRectUse::Multiplex && is_seen).then(|| {
+        format!(
+            "full and reduced keys are seen to alternate at {:.0} Hz: expected {FUSED_HZ} keys a \
+             second or more, found {keys_hz:.0}",
+            keys_hz / 2.0
+        )
+    })
+}
 
 /// The last values of a duration.
 #[derive(Clone, Debug)]
@@ -142,6 +162,15 @@ mod tests {
 
     fn at_ms(ms: i64) -> MonoTime {
         MonoTime::ZERO + MonoSpan::from_ms(ms)
+    }
+
+    #[test]
+    fn only_slow_multiplexing_alternates_visibly() {
+        assert_eq!(alternation(ValidRectUse::Multiplex, 89.0), None);
+        assert_eq!(alternation(ValidRectUse::Multiplex, 0.0), None, "no keys at all");
+        assert_eq!(alternation(ValidRectUse::Stretch, 60.0), None);
+        let said = alternation(ValidRectUse::Multiplex, 60.0).unwrap();
+        assert!(said.contains("at 30 Hz") && said.contains("found 60"), "{said}");
     }
 
     #[test]

@@ -30,7 +30,7 @@ use super::display::WindowDisplay;
 use super::hints::Hints;
 use super::intake::Intake;
 use super::mailbox::{Mailbox, Submission, Taken, UiSubmission};
-use super::observed::{KeyInstants, Observed};
+use super::observed::{KeyInstants, Observed, alternation};
 use super::{FromStream, StreamEvent};
 use crate::clock::{self, Alarm, Woken};
 use crate::control::StreamStatus;
@@ -502,6 +502,7 @@ impl StreamThread {
         let sink = (sink > 0).then(|| format!("the sink was too slow for {sink} frames"));
         let models = self.core.inspect().map(|it| it.rung_percent()).unwrap_or_default();
         let suspicion = self.suspicion.clone().filter(|found| !found.is_empty());
+        let alternates = alternation(self.parts.create.format.valid_rect_use, rates_hz.keys);
         let mut report = StreamStatus {
             width: self.parts.create.format.width,
             height: self.parts.create.format.height,
@@ -518,7 +519,7 @@ impl StreamThread {
                 .into_iter()
                 .map(|(name, share)| (name.to_owned(), share))
                 .collect(),
-            warnings: fell.chain(sink).chain(suspicion).collect(),
+            warnings: fell.chain(sink).chain(suspicion).chain(alternates).collect(),
             ..StreamStatus::default()
         };
         if let Some(window) = &mut self.window {

@@ -23,12 +23,13 @@ const HALF_SIGN: u16 = 0x8000;
 pub(super) fn image_rect(format: &StreamFormat, plane: &CheckedPlane<'_>) -> Rect {
     match format.valid_rect_use {
         ValidRectUse::Letterbox => plane.valid,
-        ValidRectUse::Stretch => Rect::full(format.width, format.height),
+        ValidRectUse::Stretch | ValidRectUse::Multiplex => Rect::full(format.width, format.height),
     }
 }
 
 /// Reads `plane` into `color` and returns the rectangle of it that moves. `whole` keeps the plane
-/// as it came while its valid rectangle is stretched.
+/// as it came where its valid rectangle is stretched; a reduced picture of a multiplexed stream
+/// stays there, and `color` is left to who restores it.
 pub(super) fn decode_color(
     pool: &ThreadPool,
     format: &StreamFormat,
@@ -45,6 +46,9 @@ pub(super) fn decode_color(
         return image;
     }
     color.reset(format.color, format.width, format.height);
+    if format.valid_rect_use == ValidRectUse::Multiplex {
+        return image;
+    }
     match (&*whole, color) {
         (ColorPlane::Rgba8(from), ColorPlane::Rgba8(to)) => stretch_to(pool, from, plane.valid, to),
         (ColorPlane::Rgb10a2(from), ColorPlane::Rgb10a2(to)) => {

@@ -61,10 +61,15 @@ impl<'a> CheckedPlane<'a> {
     }
 
     /// Checks that the valid rectangle has a quarter to all of the resolution of `color`'s.
-    pub(super) fn check_ratio(&self, plane: PlaneName, color: Rect) -> Result<(), DecodeError> {
+    pub(super) fn check_ratio(
+        &self,
+        plane: PlaneName,
+        color: Rect,
+        finest: Rect,
+    ) -> Result<(), DecodeError> {
         let (min_width, min_height) = ((color.width / 4).max(1), (color.height / 4).max(1));
-        let columns = min_width..=color.width;
-        let rows = min_height..=color.height;
+        let columns = min_width..=finest.width;
+        let rows = min_height..=finest.height;
         if columns.contains(&self.valid.width) && rows.contains(&self.valid.height) {
             return Ok(());
         }
@@ -72,8 +77,8 @@ impl<'a> CheckedPlane<'a> {
             plane,
             min_width,
             min_height,
-            max_width: color.width,
-            max_height: color.height,
+            max_width: finest.width,
+            max_height: finest.height,
             width: self.valid.width,
             height: self.valid.height,
         })

@@ -29,7 +29,7 @@ pub use motion_field::{MotionField, decode_field};
 use rayon::ThreadPool;
 
 use crate::color::ColorPlane;
-use crate::format::{CameraMotion, DepthMeaning, StreamFormat};
+use crate::format::{CameraMotion, DepthMeaning, StreamFormat, ValidRectUse};
 use crate::key::{KeyFrame, KeyInput};
 use crate::mask;
 use crate::plane::{Plane, Rect};
@@ -51,6 +51,12 @@ pub struct DecodeScratch {
 }
 
 impl DecodeScratch {
+    /// The colour plane of the key that was decoded last as it came, if that was reduced.
+    #[must_use]
+    pub fn reduced_color(&self) -> &ColorPlane {
+        &self.color
+    }
+
     /// Motion as decoded of the key that was decoded last, if that has motion.
     #[must_use]
     pub fn displacement(&self) -> &Plane<[f32; 2]> {
@@ -117,6 +123,9 @@ pub struct DecodeReport {
     pub depth_contradiction: Option<DepthMeaning>,
     /// Vectors lack the camera's motion, and depth or one of the two cameras is missing.
     pub lacks_camera_motion: bool,
+    /// The part of [`DecodeScratch::reduced_color`] that holds the picture, where a multiplexed
+    /// stream sent a reduced one. The key's colour is then still to be made.
+    pub reduced: Option<Rect>,
 }
 
 /// Converts one key frame into `key`, whose buffers are reused. Motion that no eye can follow is
@@ -142,8 +151,12 @@ pub fn decode_key(
     key.acceleration.resize(0, 0);
     key.came.resize(0, 0);
     key.displacement.resize(0, 0);
+    key.steady.reset(format.color, 0, 0);
     key.valid =
         color::decode_color(pool, format, &planes.color, &mut scratch.color, &mut key.color);
+    let is_reduced =
+        format.valid_rect_use == ValidRectUse::Multiplex && planes.color.valid != key.valid;
+    report.reduced = is_reduced.then_some(planes.color.valid);
     let projection =
         input.camera.and_then(|camera| ProjectionDepth::from_projection(&camera.projection));
     let field = FieldInput::new(format, input, &planes, projection, key.valid, pool)?;
@@ -211,7 +224,12 @@ impl<'a> CheckedKey<'a> {
             let Some(found) = found else { return Ok(None) };
             let bytes_per_pixel = bytes_per_pixel.ok_or(DecodeError::Undeclared { plane })?;
             let checked = CheckedPlane::new(plane, &found, bytes_per_pixel)?;
-            checked.check_ratio(plane, color.valid)?;
+            // Keys of either size may have the same depth and motion.
+            let finest = match format.valid_rect_use {
+                ValidRectUse::Multiplex => Rect::full(width, height),
+                ValidRectUse::Letterbox | ValidRectUse::Stretch => color.valid,
+            };
+            checked.check_ratio(plane, color.valid, finest)?;
             Ok(Some(checked))
         };
         let depth_bytes = format.depth.map(|depth| depth.format.bytes_per_pixel());

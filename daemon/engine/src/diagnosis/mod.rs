@@ -128,7 +128,7 @@ impl MotionCheck {
         }
         let step = Step::new(format, key, displacement, older);
         let declared_before = self.declared.samples;
-        let samples = match (&key.color, &older.color) {
+        let samples = match (key.compared(), older.compared()) {
             (ColorPlane::Rgba8(now), ColorPlane::Rgba8(then)) => self.sum(&step, [now, then]),
             (ColorPlane::Rgb10a2(now), ColorPlane::Rgb10a2(then)) => self.sum(&step, [now, then]),
             (ColorPlane::Rgba16f(now), ColorPlane::Rgba16f(then)) => self.sum(&step, [now, then]),

@@ -173,7 +173,7 @@ impl Trust {
             return;
         }
         self.sums.resize(columns, rows);
-        match (&key.color, &older.color) {
+        match (key.compared(), older.compared()) {
             (ColorPlane::Rgba8(now), ColorPlane::Rgba8(then)) => {
                 self.sum(pool, [now, then], key.valid, lattice, turn);
             }

@@ -49,9 +49,6 @@ pub(super) trait Wide: Texel {
 
     fn widen(self) -> Self::Lanes;
     fn narrow(lanes: Self::Lanes) -> Self;
-    /// Red, green, blue, alpha.
-    fn channels(self) -> [u16; 4];
-    fn of_channels(channels: [u16; 4]) -> Self;
 
     /// Of each column, the pixels of three rows weighed and added up.
     #[inline(always)]
@@ -157,17 +154,6 @@ impl Wide for Rgba8 {
         Self((pairs | pairs >> 16) as u32)
     }
 
-    #[inline(always)]
-    fn channels(self) -> [u16; 4] {
-        self.0.to_le_bytes().map(u16::from)
-    }
-
-    #[inline(always)]
-    fn of_channels(channels: [u16; 4]) -> Self {
-        let [r, g, b, a] = channels.map(u32::from);
-        Self(r | g << 8 | b << 16 | a << 24)
-    }
-
     #[cfg(target_arch = "x86_64")]
     #[inline(always)]
     fn weigh(rows: [&[Self]; 3], weights: [u32; 3], sums: &mut [Packed]) {
@@ -216,17 +202,6 @@ impl Wide for Rgb10a2 {
         let [r, g, b, a] = [0, 16, 32, 48].map(|shift| (lanes >> shift & 0x3ff) as u16);
         Self::of_channels([r, g, b, a & 3])
     }
-
-    #[inline(always)]
-    fn channels(self) -> [u16; 4] {
-        [0, 10, 20, 30].map(|shift| (self.0 >> shift & 0x3ff) as u16)
-    }
-
-    #[inline(always)]
-    fn of_channels(channels: [u16; 4]) -> Self {
-        let [r, g, b, a] = channels.map(u32::from);
-        Self(r | g << 10 | b << 20 | a << 30)
-    }
 }
 
 /// Four channels of 32 bits.
@@ -268,16 +243,6 @@ impl Wide for OrderedRgba16 {
     #[expect(clippy::cast_possible_truncation, reason = "a mean of 16 bits has 16 bits")]
     fn narrow(Quad(lanes): Self::Lanes) -> Self {
         Self(lanes.map(|channel| channel as u16))
-    }
-
-    #[inline(always)]
-    fn channels(self) -> [u16; 4] {
-        self.0
-    }
-
-    #[inline(always)]
-    fn of_channels(channels: [u16; 4]) -> Self {
-        Self(channels)
     }
 }
 

@@ -78,24 +78,7 @@ impl Shares {
                 peak_cd_m2: peak,
             },
         };
-        let gamma = |channel: usize| config.gamma.map(|gamma| gamma[channel]);
-        let white = if format.white_cd_m2 > 0.0 { f64::from(format.white_cd_m2) } else { peak };
-        let light = |channel: usize, code: f64| match (format.transfer, gamma(channel)) {
-            (Transfer::Srgb, Some(gamma)) => libm::pow(code.max(0.0), gamma),
-            (Transfer::Srgb, None) => srgb_to_linear(code),
-            (Transfer::Pq, _) => pq_to_luminance(code) / white,
-            (Transfer::Linear, _) => code,
-        };
-        let table = |channel| match format.color {
-            ColorFormat::Rgba8 => LightTable::new(256, |code| light(channel, code)),
-            ColorFormat::Rgb10a2 => LightTable::new(1024, |code| light(channel, code)),
-            ColorFormat::Rgba16f => {
-                LightTable::new(1 << 16, |code| light(channel, half_of(code).clamp(0.0, 1.0)))
-            }
-        };
-        // Codes that give no light at any level make no display: nothing to share.
-        let [Ok(red), Ok(green), Ok(blue)] = [0, 1, 2].map(table) else { return None };
-        let channels = [red, green, blue];
+        let channels = light_tables(format, config)?;
         Some(Self { format: format.color, channels, limit, by_frames: Default::default() })
     }
 
@@ -113,6 +96,32 @@ impl Shares {
         }
         place.as_deref().map(|tables| Split { is_key, tables })
     }
+}
+
+/// The light that the display makes of each level of red, green and blue; None where codes give no
+/// light at any level, which makes no display.
+#[must_use]
+pub fn light_tables(format: &StreamFormat, config: &FinishConfig) -> Option<[LightTable; 3]> {
+    let gamma = |channel: usize| config.gamma.map(|gamma| gamma[channel]);
+    let white = match f64::from(format.white_cd_m2) {
+        white if white > 0.0 => white,
+        _ => config.peak_cd_m2.unwrap_or(UNKNOWN_PEAK),
+    };
+    let light = |channel: usize, code: f64| match (format.transfer, gamma(channel)) {
+        (Transfer::Srgb, Some(gamma)) => libm::pow(code.max(0.0), gamma),
+        (Transfer::Srgb, None) => srgb_to_linear(code),
+        (Transfer::Pq, _) => pq_to_luminance(code) / white,
+        (Transfer::Linear, _) => code,
+    };
+    let table = |channel| match format.color {
+        ColorFormat::Rgba8 => LightTable::new(256, |code| light(channel, code)),
+        ColorFormat::Rgb10a2 => LightTable::new(1024, |code| light(channel, code)),
+        ColorFormat::Rgba16f => {
+            LightTable::new(1 << 16, |code| light(channel, half_of(code).clamp(0.0, 1.0)))
+        }
+    };
+    let [red, green, blue] = [0, 1, 2].map(table);
+    Some([red.ok()?, green.ok()?, blue.ok()?])
 }
 
 /// The number that a code of 0 to 1 over all ordered halves stands for; what comes before the

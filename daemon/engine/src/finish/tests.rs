@@ -8,7 +8,7 @@ use proptest::prelude::*;
 
 use super::lanes::Wide;
 use super::*;
-use crate::color::{ColorFormat, OrderedRgba16, Rgba8, half_to_ordered, ordered_to_half};
+use crate::color::{ColorFormat, OrderedRgba16, Rgba8, Texel, half_to_ordered, ordered_to_half};
 use crate::engine::start_pool;
 use crate::format::Transfer;
 use crate::plane::Plane;

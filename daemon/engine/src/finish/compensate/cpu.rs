@@ -5,7 +5,7 @@ use rayon::ThreadPool;
 #[cfg(target_arch = "x86_64")]
 use super::avx2;
 use crate::bands::for_each_row;
-use crate::color::{ColorPlane, Rgba8};
+use crate::color::{ColorPlane, Rgba8, Texel};
 use crate::finish::lanes::{Wide, expanded};
 use crate::finish::pyramid::{Pyramid, up_row};
 use crate::finish::shares::{ByteTables, Split};

@@ -139,7 +139,7 @@ impl Pyramid {
     pub(super) fn update(&mut self, pool: &ThreadPool, key: &KeyFrame) {
         self.levels.resize_with(HALVINGS + 1, Level::default);
         let finest = &mut self.levels[0];
-        match &key.color {
+        match key.compared() {
             ColorPlane::Rgba8(color) => finest.take(pool, color, key.valid),
             ColorPlane::Rgb10a2(color) => finest.take(pool, color, key.valid),
             ColorPlane::Rgba16f(color) => finest.take(pool, color, key.valid),
