@@ -82,6 +82,11 @@ pub struct Args {
     #[arg(long)]
     #[serde(default, deserialize_with = "from_name")]
     pub finish: Option<FinishMode>,
+    /// Where pictures are finished, blur all of an in-between frame: sharper where things move, but
+    /// not only where its motion is not to be relied on
+    #[arg(long)]
+    #[serde(default)]
+    pub finish_whole: bool,
     /// Display that shows the output: a built-in profile (`foreframe perception displays`) or a
     /// file that ends in .toml. Where there is no --ppd it gives that too, from 65 cm before a
     /// screen. A stream that names a profile is for that display instead
@@ -310,6 +315,7 @@ impl Args {
             threads: self.threads.or(file.threads),
             ppd: self.ppd.or(file.ppd),
             finish: self.finish.or(file.finish),
+            finish_whole: self.finish_whole || file.finish_whole,
             profile: self.profile.or(file.profile),
             profiles: self.profiles.or(file.profiles),
             log: self.log.or(file.log),
@@ -380,7 +386,8 @@ impl Args {
             threads: self.threads.unwrap_or(processors),
             pixels_per_degree: self.ppd.or_else(|| profile.as_ref().and_then(profile_ppd)),
             is_ppd_given: self.ppd.is_some(),
-            finish: FinishConfig::new(mode, profile.as_ref(), refresh_interval),
+            finish: FinishConfig::new(mode, profile.as_ref(), refresh_interval)
+                .whole(self.finish_whole),
             profile: profile.map(|profile| profile.name().to_owned()),
             profiles: profiles.unwrap_or_default(),
             log,
@@ -417,12 +424,12 @@ impl Config {
             });
         };
         let profile = self.profiles.named(name.as_str())?;
-        let FinishConfig { mode, refresh_interval, .. } = self.finish;
+        let FinishConfig { mode, is_whole, refresh_interval, .. } = self.finish;
         let given = self.pixels_per_degree.filter(|_| self.is_ppd_given);
         Ok(Viewed {
             name: Some(profile.name().to_owned()),
             pixels_per_degree: given.or_else(|| profile_ppd(&profile)),
-            finish: FinishConfig::new(mode, Some(&profile), refresh_interval),
+            finish: FinishConfig::new(mode, Some(&profile), refresh_interval).whole(is_whole),
         })
     }
 
@@ -440,6 +447,7 @@ impl Config {
             ("threads", self.threads != new.threads),
             ("ppd", self.pixels_per_degree != new.pixels_per_degree),
             ("finish", self.finish.mode != new.finish.mode),
+            ("finish-whole", self.finish.is_whole != new.finish.is_whole),
             ("profile", self.profile != new.profile),
             ("profiles", self.profiles != new.profiles),
             ("log", self.log != new.log),
@@ -490,7 +498,7 @@ mod tests {
     const PROFILES: &str = "../fixtures/profiles";
 
     /// Every option with a value that is not its default, by the name that flag and file share.
-    const EVERY_OPTION: [(&str, &str, &str); 19] = [
+    const EVERY_OPTION: [(&str, &str, &str); 20] = [
         ("socket", "/run/x", "'/run/x'"),
         ("sink", "png:out", "'png:out'"),
         ("fullscreen", "", "true"),
@@ -505,6 +513,7 @@ mod tests {
         ("threads", "3", "3"),
         ("ppd", "56", "56"),
         ("finish", "auto", "'auto'"),
+        ("finish-whole", "", "true"),
         ("profile", "htc-vive", "'htc-vive'"),
         ("profiles", PROFILES, "'../fixtures/profiles'"),
         ("log", "trace", "'trace'"),

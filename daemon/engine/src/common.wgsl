@@ -19,6 +19,8 @@ struct FrameParams {
     is_key: u32,
     levels: u32,
     most_step: u32,
+    is_selective: u32,
+    reserved: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: FrameParams;

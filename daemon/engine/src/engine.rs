@@ -308,14 +308,16 @@ impl Engine {
             self.scratch.map.update(key.valid, cells, key.field_offset);
         }
         self.backend.take_key(&self.pool, self.config.method.warp(), &key, &self.scratch.map);
+        if let Some(finish) = &mut self.finish {
+            let evidence = self.ladder.as_ref().map(Ladder::evidence);
+            let older = self.newest.as_ref();
+            finish.take_key(&self.pool, &key, older, &self.scratch.map, evidence);
+        }
         let newest = self.newest.replace(key);
         let dropped = std::mem::replace(&mut self.previous, newest);
         self.spare = dropped.unwrap_or_default();
         if input.is_cut {
             self.spare = self.previous.take().unwrap_or_default();
-        }
-        if let Some(finish) = &mut self.finish {
-            finish.ledger.on_key(input.is_cut);
         }
         Ok(KeyReport {
             work: (self.config.timer)() - started_at,
@@ -429,7 +431,9 @@ impl Engine {
             _ if phase == Phase::ZERO => Some(key),
             _ => None,
         };
-        let part = self.finish.as_mut().map(|finish| finish.ledger.next_part());
+        let is_after = shown.is_none() && !self.config.method.interpolates();
+        let moved = if is_after { phase } else { Phase::ZERO };
+        let part = self.finish.as_mut().map(|finish| finish.next_part(moved));
         let is_finished = if let Some(shown) = shown {
             out.copy_from(&shown.color);
             false

@@ -55,6 +55,7 @@ pub const KERNELS: &[Kernel] = &[
     exact("warp/linear", "has_previous", Some(&PREVIOUS)),
     exact("warp/grid", "warp_grid", Some(&GRID)),
     exact("warp/voxel", "warp_voxel", None),
+    exact("finish/selection", "take_key", None),
     exact("finish/pyramid", "pyramid", Some(&PYRAMID)),
     exact("finish/compensate", "compensate", Some(&COMPENSATE)),
     exact("ui", "composite", None),

@@ -46,6 +46,10 @@ pub struct FrameParams {
     pub levels: u32,
     /// How far the light of an in-between frame may lie from the original's.
     pub most_step: u32,
+    /// 1 where tiles are blurred as far as their weights say, 0 where all of the picture is.
+    pub is_selective: u32,
+    /// 0: fills the struct up to what a shader takes it to be.
+    pub reserved: u32,
 }
 
 impl FrameParams {
@@ -79,6 +83,7 @@ impl FrameParams {
             is_key: u32::from(split.is_key),
             levels: u32::from(table.table().last_level()) + 1,
             most_step: table.most_step(),
+            is_selective: u32::from(split.weights.is_some()),
             ..self
         }
     }
@@ -92,6 +97,17 @@ pub fn light_words(split: &Split<'_>) -> Vec<u32> {
     let lights = tables.iter().flat_map(|[lights, _]| lights.iter().copied());
     let borders = tables.iter().flat_map(|[_, borders]| borders.iter().copied().chain([u32::MAX]));
     lights.chain(borders).collect()
+}
+
+/// The words of `compensate.wgsl`'s weights, four tiles to a word; one word where there are none.
+pub fn weight_words(split: &Split<'_>, words: &mut Vec<u32>) {
+    words.clear();
+    let weights = split.weights.map_or(&[0; 4][..], |weights| weights.data());
+    words.extend(
+        weights
+            .chunks(4)
+            .map(|four| four.iter().rev().fold(0, |word, weight| word << 8 | u32::from(*weight))),
+    );
 }
 
 /// What shaders call a colour format: the constants of `color.wgsl`.

@@ -324,6 +324,7 @@ fn session_info(config: &Config, display_origin: MonoTime) -> SessionInfo {
     session
         .with_config("method", config.method)
         .with_config("finish", config.finish.mode)
+        .with_config("finish_whole", config.finish.is_whole)
         .with_config("refresh_interval_ns", config.refresh_interval.as_ns())
         .with_config(DISPLAY_ORIGIN, display_origin.as_ns())
         .with_config("sink", &config.sink)

@@ -53,6 +53,10 @@ pub struct Args {
     /// is seen.
     #[arg(long, default_value_t = FinishMode::Off)]
     pub finish: FinishMode,
+    /// With --finish, blur all of an in-between frame: sharper where things move, but not only where
+    /// its motion is not to be relied on.
+    #[arg(long)]
+    pub finish_whole: bool,
     /// Leave out in-between frames until something has moved by so many pixels, 0 to 16.
     #[arg(long, value_name = "PX", default_value_t = 0.0, value_parser = number(0.0, 16.0))]
     #[arg(allow_negative_numbers = true)]
@@ -144,7 +148,8 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
         display_origin: if args.step { None } else { recording.display_origin()? },
         pixels_per_degree: display.pixels_per_degree,
         late_cameras: timed_poses(&recording.late_cameras(), recording.heads(), &plan, timing),
-        finish: FinishConfig::new(args.finish, display.profile.as_ref(), refresh_interval),
+        finish: FinishConfig::new(args.finish, display.profile.as_ref(), refresh_interval)
+            .whole(args.finish_whole),
         #[expect(clippy::cast_possible_truncation, reason = "a number of 0 to 16")]
         least_step_px: args.least_step as f32,
     };

@@ -50,6 +50,10 @@ pub struct Args {
     /// is seen.
     #[arg(long, default_value_t = FinishMode::Off)]
     pub finish: FinishMode,
+    /// With --finish, blur all of an in-between frame: sharper where things move, but not only where
+    /// its motion is not to be relied on.
+    #[arg(long)]
+    pub finish_whole: bool,
     /// Compare what an eye that follows the motion sees, too: of the frames, of the keys alone, and
     /// of the true frames.
     #[arg(long)]
@@ -124,7 +128,8 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
         if args.finish != FinishMode::Off {
             let display = said.of(recording).with_context(|| path.display().to_string())?;
             let profile = display.profile.as_ref();
-            options.finish = FinishConfig::new(args.finish, profile, refresh_interval);
+            options.finish =
+                FinishConfig::new(args.finish, profile, refresh_interval).whole(args.finish_whole);
         }
         let score = score_recording(&name, recording, &options, || progress.inc(1))
             .with_context(|| format!("scoring {}", path.display()))?;

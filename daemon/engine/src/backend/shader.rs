@@ -131,6 +131,8 @@ pub enum Slot {
     SmoothLevel,
     /// Light of levels: [`crate::params::light_words`].
     Lights,
+    /// How far tiles are blurred, four to a word: [`crate::finish::selection`].
+    Weights,
     /// The picture.
     Out,
 }

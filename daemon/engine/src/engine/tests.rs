@@ -185,7 +185,7 @@ mod on_gpus {
 fn finishing_is_off_by_default_and_on_it_shares_the_light_of_a_key_among_its_frames() {
     use crate::finish::{FinishConfig, FinishMode};
     let with = |mode| {
-        let finish = FinishConfig { mode, ..FinishConfig::default() };
+        let finish = FinishConfig { mode, is_whole: true, ..FinishConfig::default() };
         let config = EngineConfig { finish, ..EngineConfig::new(Method::Hold, NonZeroUsize::MIN) };
         let mut engine = Engine::new(format(), config);
         let alternates = engine.alternates();

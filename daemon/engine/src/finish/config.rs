@@ -62,6 +62,9 @@ impl FromStr for FinishMode {
 pub struct FinishConfig {
     /// When pictures are finished.
     pub mode: FinishMode,
+    /// Whether all of a picture is blurred, and not only where what was foreseen of it is not to be
+    /// relied on.
+    pub is_whole: bool,
     /// Gamma of red, green and blue of the display; None where it follows the stream's transfer.
     pub gamma: Option<[f64; 3]>,
     /// Luminance of white, cd/m2; None where it is not known.
@@ -75,11 +78,23 @@ impl Default for FinishConfig {
     /// Off.
     fn default() -> Self {
         let refresh_interval = MonoSpan::ZERO;
-        Self { mode: FinishMode::Off, gamma: None, peak_cd_m2: None, refresh_interval }
+        Self {
+            mode: FinishMode::Off,
+            is_whole: false,
+            gamma: None,
+            peak_cd_m2: None,
+            refresh_interval,
+        }
     }
 }
 
 impl FinishConfig {
+    /// The same, where all of a picture is blurred if `is_whole`.
+    #[must_use]
+    pub fn whole(self, is_whole: bool) -> Self {
+        Self { is_whole, ..self }
+    }
+
     /// For a display of `profile`, of which one picture lasts `refresh_interval`.
     #[must_use]
     pub fn new(
@@ -89,6 +104,7 @@ impl FinishConfig {
     ) -> Self {
         Self {
             mode,
+            is_whole: false,
             gamma: profile.map(|profile| profile.model().gamma()),
             peak_cd_m2: profile.map(DisplayProfile::peak_luminance),
             refresh_interval,

@@ -9,6 +9,7 @@ pub(super) mod avx2;
 use std::cell::RefCell;
 use std::ops::Add;
 
+use super::selection::FULL;
 use crate::color::{OrderedRgba16, Rgb10a2, Rgba8, Texel};
 #[cfg(target_arch = "x86_64")]
 use crate::simd::has_avx2;
@@ -103,6 +104,18 @@ pub(super) fn expanded<T: Wide>(sums: &[T::Lanes], column: usize) -> T {
         here.times(4) + after.times(4)
     };
     T::narrow(sum.rounded(6))
+}
+
+/// `original`, and `blurred` as far as `weight` of [`FULL`] says: (1) of `super::compensate`.
+#[inline(always)]
+pub(super) fn mixed<T: Wide>(original: T, blurred: T, weight: u8) -> T {
+    let (mut levels, blurred) = (original.channels(), blurred.channels());
+    let [of_blurred, of_original] = [u32::from(weight), u32::from(FULL - weight)];
+    for (level, blurred) in levels.iter_mut().zip(blurred) {
+        let sum = of_original * u32::from(*level) + of_blurred * u32::from(blurred);
+        *level = ((sum + u32::from(FULL / 2)) / u32::from(FULL)) as u16;
+    }
+    T::of_channels(levels)
 }
 
 /// Four channels of 16 bits, red lowest.

@@ -12,6 +12,9 @@
 //! which is at most what one key pays for. How many pictures come after a key nobody knows before;
 //! the ledger expects as many as came after the one before it, and need not be right.
 //!
+//! Which key has paid is kept with each ([`Ledger::age`]), because it paid for blur where its own
+//! weights say ([`super::selection`]).
+//!
 //! A picture that was made and not shown is told by [`Ledger::dropped`]: the display showed the one
 //! before again, and that one counts twice.
 
@@ -43,6 +46,8 @@ const CAPACITY: usize = 2 * MOST_FRAMES as usize;
 struct Balance {
     /// For each frame that was paid for, how many share the light, oldest first.
     paid: [u8; CAPACITY],
+    /// For each of them, how many keys ago it was paid for; at most 255.
+    age: [u8; CAPACITY],
     count: usize,
     owed: u32,
 }
@@ -64,18 +69,27 @@ impl Balance {
     fn add(&mut self, frames: u32, count: u32) {
         for _ in 0..count {
             if let Some(place) = self.paid.get_mut(self.count) {
-                *place = frames as u8;
+                (*place, self.age[self.count]) = (frames as u8, 0);
                 self.count += 1;
             }
         }
     }
 
-    /// Uses up the oldest frame that was paid for.
-    fn take(&mut self) -> Option<u32> {
-        let frames = *self.paid[..self.count].first()?;
+    /// Uses up the oldest frame that was paid for: how many share the light, how many keys ago it
+    /// was.
+    fn take(&mut self) -> Option<(u32, u8)> {
+        let (frames, age) = (*self.paid[..self.count].first()?, self.age[0]);
         self.paid.copy_within(1..self.count, 0);
+        self.age.copy_within(1..self.count, 0);
         self.count -= 1;
-        Some(frames.into())
+        Some((frames.into(), age))
+    }
+
+    /// A key has come.
+    fn grow_older(&mut self) {
+        for age in &mut self.age[..self.count] {
+            *age = age.saturating_add(1);
+        }
     }
 
     /// `part` was on the display once more than was planned.
@@ -101,6 +115,8 @@ impl Balance {
 pub struct Ledger {
     balance: Balance,
     shown: Part,
+    /// How many keys ago the last picture was paid for.
+    age: u8,
     /// Whether no picture was made of the newest key.
     is_new_key: bool,
     /// Pictures since the newest key.
@@ -126,6 +142,8 @@ impl Ledger {
             self.expected = if is_usual { self.since_key - 1 } else { 0 };
         }
         (self.since_key, self.is_new_key) = (0, true);
+        self.balance.grow_older();
+        self.before.balance.grow_older();
         if is_cut {
             (self.balance, self.shown) = Default::default();
         }
@@ -136,10 +154,11 @@ impl Ledger {
         let Self { balance, shown, is_new_key, .. } = *self;
         self.before = Before { balance, shown, is_new_key };
         self.since_key = self.since_key.saturating_add(1);
-        self.shown = if std::mem::take(&mut self.is_new_key) {
-            self.balance.pay(self.expected)
+        (self.shown, self.age) = if std::mem::take(&mut self.is_new_key) {
+            (self.balance.pay(self.expected), 0)
         } else {
-            self.balance.take().map_or(Part::Plain, |frames| Part::InBetween { frames })
+            let taken = self.balance.take();
+            taken.map_or((Part::Plain, 0), |(frames, age)| (Part::InBetween { frames }, age))
         };
         self.shown
     }
@@ -149,6 +168,18 @@ impl Ledger {
         let Before { balance, shown, is_new_key } = self.before;
         (self.balance, self.shown, self.is_new_key) = (balance, shown, is_new_key);
         self.balance.repeat(shown);
+    }
+
+    /// How many keys ago the last picture was paid for: 0 by the newest key.
+    #[must_use]
+    pub fn age(&self) -> u8 {
+        self.age
+    }
+
+    /// How many keys before the newest have paid for what is still to be shown, counted from it.
+    #[must_use]
+    pub fn oldest_age(&self) -> usize {
+        self.balance.age[..self.balance.count].first().copied().unwrap_or(0).into()
     }
 
     /// Whether the same picture would be the same again, until a key comes: the one on the display
@@ -209,6 +240,24 @@ mod tests {
             parts,
             [Part::Plain, Part::InBetween { frames: 4 }, Part::InBetween { frames: 4 }]
         );
+    }
+
+    #[test]
+    fn every_picture_knows_how_many_keys_ago_it_was_paid_for() {
+        let mut ledger = Ledger::default();
+        run(&mut ledger, 4);
+        run(&mut ledger, 2);
+        assert_eq!((ledger.age(), ledger.oldest_age()), (0, 0));
+        ledger.on_key(false);
+        assert_eq!(ledger.oldest_age(), 1);
+        // The key pays nothing, as two frames are paid for and one is expected; then those two.
+        let ages = [(); 3].map(|()| {
+            ledger.next_part();
+            ledger.age()
+        });
+        assert_eq!((ages, ledger.oldest_age()), ([0, 1, 1], 0));
+        run(&mut ledger, 3);
+        assert_eq!(ledger.age(), 0);
     }
 
     #[test]

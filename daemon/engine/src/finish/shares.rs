@@ -9,6 +9,7 @@ use super::pyramid::SIGMA_PX;
 use super::{FinishConfig, FinishMode, Part};
 use crate::color::{ColorFormat, half_to_ordered, ordered_to_half};
 use crate::format::{StreamFormat, Transfer};
+use crate::plane::Plane;
 
 /// White of a display of which nothing is known, cd/m2: of a bright desktop display, since flicker
 /// is seen the more the brighter it is.
@@ -40,6 +41,8 @@ pub struct Split<'a> {
     pub is_key: bool,
     /// For as many frames as share the light.
     pub tables: &'a Tables,
+    /// How far each tile is blurred ([`super::selection`]); None where all of the picture is, fully.
+    pub weights: Option<&'a Plane<u8>>,
 }
 
 /// The tables for one number of frames.
@@ -94,7 +97,7 @@ impl Shares {
         if place.is_none() {
             *place = Tables::new(*format, channels, *limit, frames).map(Box::new);
         }
-        place.as_deref().map(|tables| Split { is_key, tables })
+        place.as_deref().map(|tables| Split { is_key, tables, weights: None })
     }
 }
 

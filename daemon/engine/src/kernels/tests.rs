@@ -183,7 +183,9 @@ fn the_parameters_lie_where_the_shaders_read_them() {
         frames,
         is_key,
         levels,
-        most_step
+        most_step,
+        is_selective,
+        reserved
     );
     let found: Vec<_> =
         members.iter().map(|member| (member.name.as_deref().unwrap(), member.offset)).collect();
@@ -206,6 +208,7 @@ fn constant(module: &naga::Module, name: &str) -> Option<i64> {
 fn constants_of_the_shaders_are_those_of_the_cpu() {
     use crate::color::ColorFormat::{Rgb10a2, Rgba8, Rgba16f};
     use crate::fill::far_side::{NO_CELL, NO_ROW};
+    use crate::finish::selection;
     use crate::params::format_code;
     use crate::warp::grid::{FARTHEST, LANES};
     use crate::warp::resolve::HOLE;
@@ -229,6 +232,8 @@ fn constants_of_the_shaders_are_those_of_the_cpu() {
         ("MAX_CELLS", i64::from(MAX_CELLS)),
         ("LARGEST", i64::from(crate::trajectory::effective::LARGEST)),
         ("FULL_LIGHT", i64::from(foreframe_perception::compensation::FULL_LIGHT)),
+        ("TILE", i64::from(selection::TILE)),
+        ("FULL", i64::from(selection::FULL)),
         ("RGBA8", i64::from(format_code(Rgba8))),
         ("RGB10A2", i64::from(format_code(Rgb10a2))),
         ("RGBA16F", i64::from(format_code(Rgba16f))),

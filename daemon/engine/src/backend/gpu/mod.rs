@@ -33,7 +33,7 @@ use crate::finish::pyramid::PYRAMID;
 use crate::finish::shares::Split;
 use crate::key::KeyFrame;
 use crate::method::Method;
-use crate::params::{FrameParams, light_words, map_words};
+use crate::params::{FrameParams, light_words, map_words, weight_words};
 use crate::phase::Phase;
 use crate::trajectory::effective::EFFECTIVE;
 use crate::warp::blend::BLEND;
@@ -109,6 +109,8 @@ pub(crate) struct GpuBackend {
     download: Download,
     /// The field map as the shaders read it.
     tables: Vec<u32>,
+    /// How far tiles are blurred, as the shader reads it.
+    weights: Vec<u32>,
     /// Depth of the newest key that went up, and of the one before: [`Slot::Was`] begins with that.
     depth: Vec<u32>,
     was: Vec<u32>,
@@ -143,6 +145,7 @@ impl GpuBackend {
             color_upload: Upload::default(),
             download: Download::default(),
             tables: Vec::new(),
+            weights: Vec::new(),
             depth: Vec::new(),
             was: Vec::new(),
             mesh: MeshWords::default(),
@@ -279,6 +282,7 @@ impl GpuBackend {
                     | Slot::QuarterLevel
                     | Slot::SmoothLevel
                     | Slot::Lights
+                    | Slot::Weights
                     | Slot::Was
                     | Slot::Out => continue,
                 };
@@ -288,7 +292,7 @@ impl GpuBackend {
         Ok(())
     }
 
-    /// Gives the levels their sizes, and sends the light of levels up once.
+    /// Gives the levels their sizes, and sends up the weights of tiles, and once the light of levels.
     fn prepare_finish(
         &mut self,
         split: &Split<'_>,
@@ -311,6 +315,10 @@ impl GpuBackend {
             gpu.queue.write_buffer(lights, 0, bytes);
             self.has_lights = true;
         }
+        weight_words(split, &mut self.weights);
+        let bytes = self.weights.as_bytes();
+        let weights = self.planes.sized(&gpu, Slot::Weights, bytes.len() as u64)?;
+        gpu.queue.write_buffer(weights, 0, bytes);
         Ok(())
     }
 

@@ -364,14 +364,16 @@ fn every_adapter_finishes_as_the_cpu_does() {
     let cases = [([1, 1], None), ([17, 9], None), ([203, 77], Some([3, 5, 190, 66]))];
     for gpu in test_gpus("every_adapter_finishes_as_the_cpu_does") {
         for (seed, (size, valid)) in (0..).zip(cases) {
-            for (format, mode) in FORMATS
+            for (format, mode, is_whole) in FORMATS
                 .into_iter()
                 .flat_map(|format| [(format, FinishMode::On), (format, FinishMode::Auto)])
+                .flat_map(|(format, mode)| [(format, mode, true), (format, mode, false)])
             {
                 let stream =
                     StreamFormat { color: format, ..StreamFormat::rgba8(size[0], size[1]) };
                 let config = FinishConfig {
                     mode,
+                    is_whole,
                     gamma: Some([2.2, 2.0, 1.8]),
                     refresh_interval: MonoSpan::from_hz(120.0),
                     ..FinishConfig::default()
@@ -389,6 +391,8 @@ fn every_adapter_finishes_as_the_cpu_does() {
                 let mut backend = GpuBackend::new(&gpu, format, Method::Gather, true).unwrap();
                 backend.take_key(&key, &map).unwrap();
                 let phase = Phase::from_f64(0.37);
+                finish.take_key(&pool(1), &key, None, &map, None);
+                finish.turn_to(phase, 0);
                 for part in parts {
                     let mut expected = on_cpu(Method::Gather, &[&key], phase);
                     finish.apply(&pool(1), part, key.valid, &mut expected);

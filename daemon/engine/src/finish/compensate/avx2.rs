@@ -5,16 +5,20 @@
 //! blur, the tables are looked up. The caller asks the processor whether it has AVX2.
 
 use std::arch::x86_64::{
-    __m256i, _mm_setr_epi8, _mm256_and_si256, _mm256_andnot_si256, _mm256_broadcastsi128_si256,
-    _mm256_cmpeq_epi32, _mm256_i32gather_epi32, _mm256_loadu_si256, _mm256_max_epu8,
-    _mm256_min_epu8, _mm256_movemask_epi8, _mm256_or_si256, _mm256_set1_epi8, _mm256_set1_epi32,
-    _mm256_shuffle_epi8, _mm256_slli_epi32, _mm256_srli_epi16, _mm256_srli_epi32,
-    _mm256_storeu_si256, _mm256_subs_epu8, _mm256_testz_si256,
+    __m256i, _mm_setr_epi8, _mm256_add_epi16, _mm256_and_si256, _mm256_andnot_si256,
+    _mm256_broadcastsi128_si256, _mm256_cmpeq_epi32, _mm256_i32gather_epi32, _mm256_loadu_si256,
+    _mm256_max_epu8, _mm256_min_epu8, _mm256_movemask_epi8, _mm256_mullo_epi16, _mm256_or_si256,
+    _mm256_packus_epi16, _mm256_set1_epi8, _mm256_set1_epi16, _mm256_set1_epi32,
+    _mm256_set1_epi64x, _mm256_setr_epi8, _mm256_setzero_si256, _mm256_shuffle_epi8,
+    _mm256_slli_epi32, _mm256_srai_epi16, _mm256_srli_epi16, _mm256_srli_epi32,
+    _mm256_storeu_si256, _mm256_sub_epi16, _mm256_subs_epu8, _mm256_testz_si256,
+    _mm256_unpackhi_epi8, _mm256_unpacklo_epi8,
 };
 
 use crate::color::Rgba8;
 use crate::finish::lanes::Wide;
 use crate::finish::lanes::avx2::expanded;
+use crate::finish::selection::FULL;
 use crate::finish::shares::ByteTables;
 
 /// Pixels of one step.
@@ -26,20 +30,62 @@ pub(super) fn row(
     tables: &ByteTables,
     is_key: bool,
     sums: &[<Rgba8 as Wide>::Lanes],
+    weights: Option<&[u8]>,
     row: &mut [Rgba8],
 ) -> usize {
     let count = row.len() / LANES;
+    let mut weights = weights.map(|weights| weights.as_chunks::<LANES>().0.iter());
     let room = Room::new(tables);
     for (step, texels) in row.chunks_exact_mut(LANES).enumerate() {
+        let weight = match &mut weights {
+            None => [FULL; LANES],
+            Some(weights) => weights.next().copied().unwrap_or_default(),
+        };
+        if weight == [0; LANES] {
+            continue;
+        }
         // SAFETY: there are 8 pixels of 4 bytes, and the load needs no alignment.
         let original = unsafe { _mm256_loadu_si256(texels.as_ptr().cast()) };
-        let blur = expanded(sums, LANES / 2 * step);
+        let mut blur = expanded(sums, LANES / 2 * step);
+        if weight != [FULL; LANES] {
+            blur = mixed(original, blur, weight);
+        }
         let made =
             if is_key { key(tables, original, blur) } else { room.between(tables, original, blur) };
         // SAFETY: there are 8 pixels of 4 bytes, and the store needs no alignment.
         unsafe { _mm256_storeu_si256(texels.as_mut_ptr().cast(), made) };
     }
     count * LANES
+}
+
+/// (0)
+#[inline]
+#[target_feature(enable = "avx2")]
+fn mixed(original: __m256i, blur: __m256i, weights: [u8; LANES]) -> __m256i {
+    let four_of_each = _mm256_setr_epi8(
+        0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3, 4, 4, 4, 4, 5, 5, 5, 5, 6, 6, 6, 6, 7, 7,
+        7, 7,
+    );
+    let weights = _mm256_set1_epi64x(u64::from_le_bytes(weights).cast_signed());
+    let weights = _mm256_shuffle_epi8(weights, four_of_each);
+    let zero = _mm256_setzero_si256();
+    // |s - o| w + 64 is at most 255 * 128 + 64, inside 16 bits with a sign.
+    let half = |original: __m256i, blur: __m256i, weights: __m256i| {
+        let way = _mm256_mullo_epi16(_mm256_sub_epi16(blur, original), weights);
+        let way = _mm256_srai_epi16(_mm256_add_epi16(way, _mm256_set1_epi16(64)), 7);
+        _mm256_add_epi16(original, way)
+    };
+    let low = half(
+        _mm256_unpacklo_epi8(original, zero),
+        _mm256_unpacklo_epi8(blur, zero),
+        _mm256_unpacklo_epi8(weights, zero),
+    );
+    let high = half(
+        _mm256_unpackhi_epi8(original, zero),
+        _mm256_unpackhi_epi8(blur, zero),
+        _mm256_unpackhi_epi8(weights, zero),
+    );
+    _mm256_packus_epi16(low, high)
 }
 
 /// How far the blur may lie from the original before a table has to be asked.

@@ -6,6 +6,11 @@
 // nearer.
 @group(0) @binding(4) var<storage, read> lights: array<u32>;
 
+// How far tiles are blurred, four to a word, row by row.
+@group(0) @binding(5) var<storage, read> weights: array<u32>;
+
+const TILE: u32 = 8u;
+const FULL: u32 = 128u;
 const FULL_LIGHT: u32 = 0x1000000u;
 
 fn smooth_at(at: vec2<i32>) -> vec4<u32> {
@@ -36,6 +41,32 @@ fn blur_at(index: vec2<u32>) -> vec4<u32> {
         }
     }
     return sum >> vec4<u32>(6u);
+}
+
+fn tile_weight(at: vec2<i32>) -> u32 {
+    let size = (params.valid_size + TILE - 1u) / TILE;
+    let place = vec2<u32>(clamp(at, vec2<i32>(0), vec2<i32>(size) - 1));
+    let index = place.y * size.x + place.x;
+    return (weights[index >> 2u] >> (8u * (index & 3u))) & 0xffu;
+}
+
+// How far a pixel is blurred: `row_weights`.
+fn weight_at(index: vec2<u32>) -> u32 {
+    let place = 2 * vec2<i32>(index) + 1 - i32(TILE);
+    let tile = place >> vec2<u32>(4u);
+    let way = vec2<u32>(place & vec2<i32>(15));
+    var columns = vec2<u32>(0u);
+    for (var x = 0; x < 2; x++) {
+        let above = tile_weight(tile + vec2<i32>(x, 0));
+        let below = tile_weight(tile + vec2<i32>(x, 1));
+        columns[x] = (16u - way.y) * above + way.y * below;
+    }
+    return ((16u - way.x) * columns.x + way.x * columns.y + 128u) >> 8u;
+}
+
+// (0)
+fn mixed(original: vec4<u32>, blurred: vec4<u32>, weight: u32) -> vec4<u32> {
+    return ((FULL - weight) * original + weight * blurred + FULL / 2u) >> vec4<u32>(7u);
 }
 
 fn light_of(channel: u32, level: u32) -> u32 {
@@ -100,7 +131,10 @@ fn compensate(@builtin(global_invocation_id) id: vec3<u32>) {
         texel = Texel(out[2u * index], out[2u * index + 1u]);
     }
     var levels = channels_of(texel);
-    let blurred = blur_at(id.xy);
+    var blurred = blur_at(id.xy);
+    if params.is_selective == 1u {
+        blurred = mixed(levels, blurred, weight_at(id.xy));
+    }
     for (var channel = 0u; channel < 3u; channel++) {
         let between = in_between(channel, levels[channel], blurred[channel]);
         if params.is_key == 1u {

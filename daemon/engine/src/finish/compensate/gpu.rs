@@ -2,7 +2,7 @@
 
 use crate::backend::shader::{Binding, COLOR, COMMON, Entry, Extent, Shader, Slot};
 
-/// Equations (1) to (3), of the picture in [`Slot::Out`], in its place.
+/// Equations (0) to (3), of the picture in [`Slot::Out`], in its place.
 pub const COMPENSATE: Shader = Shader {
     file: "compensate.wgsl",
     parts: &[COMMON, COLOR, include_str!("compensate.wgsl")],
@@ -12,6 +12,7 @@ pub const COMPENSATE: Shader = Shader {
         Binding::Write(Slot::Out),
         Binding::Read(Slot::SmoothLevel),
         Binding::Read(Slot::Lights),
+        Binding::Read(Slot::Weights),
     ],
     entries: &[Entry::tiles("compensate", Extent::Pixels)],
 };
