@@ -38,8 +38,13 @@ struct State {
     record: Record,
 }
 
-/// Draws for so many seconds.
-pub(crate) fn run(socket: &Path, [width, height]: [u32; 2], seconds: i64) -> Record {
+/// Draws for so many seconds, each frame `delay` after it was asked for.
+pub(crate) fn run(
+    socket: &Path,
+    [width, height]: [u32; 2],
+    seconds: i64,
+    delay: MonoSpan,
+) -> Record {
     let stream = UnixStream::connect(socket).expect("the compositor listens");
     let connection = Connection::from_socket(stream).expect("a Wayland connection");
     let (globals, mut queue) = registry_queue_init::<State>(&connection).expect("globals");
@@ -79,6 +84,7 @@ pub(crate) fn run(socket: &Path, [width, height]: [u32; 2], seconds: i64) -> Rec
         let (true, true, Some(free)) = (state.is_configured, state.is_asked, free) else {
             continue;
         };
+        clock::sleep_until(clock::now() + delay);
         state.is_asked = false;
         state.is_busy[free] = true;
         surface.frame(&handle, ());

@@ -1,6 +1,8 @@
 //! The daemon's windows on real compositors: how often a frame is shown when it was planned, how
 //! even the frames are, and how long they take, beside a plain client that draws whenever it is
-//! asked to.
+//! asked to. Two things are not the daemon's doing, so the plain client runs twice more: once as late
+//! before the refresh as the daemon (late), and once while a daemon makes as many pictures for nobody
+//! on the processors that the compositor draws on (busy).
 //!
 //! `cargo bench -p foreframe-tests --bench window_pacing [-- SECONDS [COMPOSITOR[:HZ]...]]`. The
 //! application runs at 40 keys a second, 640x360, full screen; the first second is not counted.
@@ -12,6 +14,9 @@ mod compositors;
 mod daemon_fixture;
 mod fifo;
 mod record;
+
+use std::path::Path;
+use std::thread;
 
 use compositors::{Compositor, Kind};
 use daemon_fixture::child::{ChildProcess, run_if_asked};
@@ -26,6 +31,9 @@ use record::{Record, Row};
 
 const SIZE: [u32; 2] = [640, 360];
 const KEYS_PER_S: i64 = 40;
+/// From the commit of the plain client that is late to the refresh that it is for: about what the
+/// daemon learns to leave.
+const LATE: MonoSpan = MonoSpan::from_us(4_500);
 const DEFAULT: [&str; 5] = ["mutter:60", "mutter:120", "mutter:144", "weston:60", "sway:120"];
 
 fn main() {
@@ -52,7 +60,12 @@ fn main() {
                 .map_or("", |(_, at)| at),
         );
         let interval = MonoSpan::from_hz(f64::from(hz));
-        println!("{}", fifo::run(&socket, SIZE, seconds).row(&format!("{name} plain"), interval));
+        for (how, delay) in [("plain", MonoSpan::ZERO), ("plain, late", interval - LATE)] {
+            let record = fifo::run(&socket, SIZE, seconds, delay);
+            println!("{}", record.row(&format!("{name} {how}"), interval));
+        }
+        let beside = beside_the_daemon(&socket, hz, seconds);
+        println!("{}", beside.row(&format!("{name} plain, busy"), interval));
         let (record, keys) = through_the_daemon(&compositor, seconds);
         println!(
             "{}{}",
@@ -62,11 +75,35 @@ fn main() {
     }
 }
 
+/// The plain client again, while a daemon makes as many pictures and shows them to nobody.
+fn beside_the_daemon(compositor: &Path, hz: u32, seconds: i64) -> Record {
+    let folder = private_folder();
+    let socket = folder.path().join("daemon.sock");
+    let daemon = ChildProcess::daemon_without_windows(&socket, hz);
+    let record = thread::scope(|scope| {
+        let plain = scope.spawn(|| fifo::run(compositor, SIZE, seconds, MonoSpan::ZERO));
+        submit_keys(&socket, seconds);
+        plain.join().expect("the plain client goes on")
+    });
+    drop(daemon);
+    record
+}
+
 fn through_the_daemon(compositor: &Compositor, seconds: i64) -> (Record, Vec<Presented>) {
     let folder = private_folder();
     let [socket, log] = ["daemon.sock", "log"].map(|name| folder.path().join(name));
     let daemon = ChildProcess::daemon_with_windows(&socket, &compositor.environment, &log);
-    let mut client = Client::connect(&socket);
+    let keys = submit_keys(&socket, seconds);
+    drop(daemon);
+    if let Some(kept) = std::env::var_os("FOREFRAME_KEEP_LOG") {
+        std::fs::copy(&log, kept).expect("the place that FOREFRAME_KEEP_LOG names can be written");
+    }
+    (Record::of_log(&log), keys)
+}
+
+/// What an application does for so many seconds, and what it hears of its keys after the first one.
+fn submit_keys(socket: &Path, seconds: i64) -> Vec<Presented> {
+    let mut client = Client::connect(socket);
     let [width, height] = SIZE;
     let format = StreamFormat {
         motion: Some(MotionConvention {
@@ -97,11 +134,7 @@ fn through_the_daemon(compositor: &Compositor, seconds: i64) -> (Record, Vec<Pre
             _ => None,
         }));
     }
-    drop(daemon);
-    if let Some(kept) = std::env::var_os("FOREFRAME_KEEP_LOG") {
-        std::fs::copy(&log, kept).expect("the place that FOREFRAME_KEEP_LOG names can be written");
-    }
-    (Record::of_log(&log), keys)
+    keys
 }
 
 /// How many keys were shown more than so many refreshes after they came.

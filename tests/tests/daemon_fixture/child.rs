@@ -18,6 +18,7 @@ const ROLE: &str = "FOREFRAME_TEST_ROLE";
 const SOCKET: &str = "FOREFRAME_TEST_SOCKET";
 const RECORD: &str = "FOREFRAME_TEST_RECORD";
 const SINK: &str = "FOREFRAME_TEST_SINK";
+const REFRESH: &str = "FOREFRAME_TEST_REFRESH";
 /// What a daemon with windows logs.
 const LOG: &str = "info,foreframed::stream::display=trace";
 const READY: &str = "the child is ready";
@@ -56,7 +57,8 @@ pub(crate) fn run_if_asked() {
             let sink = std::env::var(SINK).ok().map(|sink| sink.parse().unwrap());
             let log = Some(if sink.is_some() { LOG } else { "warn" }.to_owned());
             let fullscreen = sink.is_some();
-            let args = Args { socket, record, sink, log, fullscreen, ..Args::default() };
+            let refresh = std::env::var(REFRESH).ok().map(|hz| hz.parse().unwrap());
+            let args = Args { socket, record, sink, log, fullscreen, refresh, ..Args::default() };
             match foreframed::run(args) {
                 Ok(()) => 0,
                 Err(error) => {
@@ -127,6 +129,13 @@ impl ChildProcess {
         command.env(SINK, "window").envs(environment.iter().map(|(name, value)| (name, value)));
         command.stderr(std::fs::File::create(log).unwrap());
         Self { child: command.spawn().unwrap() }
+    }
+
+    /// A daemon that makes frames at this rate and throws them away.
+    pub(crate) fn daemon_without_windows(socket: &Path, hz: u32) -> Self {
+        let mut command = Self::command(Role::Daemon, socket);
+        command.env(SINK, "null").env(REFRESH, hz.to_string()).stderr(Stdio::null());
+        Self { child: command.spawn().unwrap() }.listening(socket)
     }
 
     /// A daemon that listens.

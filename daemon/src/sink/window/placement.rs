@@ -40,9 +40,14 @@ impl Placement {
         Self { buffer, picture: centred(buffer, fitting) }
     }
 
+    /// Bytes of a row of a buffer of 4-byte texels.
+    pub(super) fn row_len(&self) -> usize {
+        self.buffer[0] as usize * 4
+    }
+
     /// Bytes of a buffer of 4-byte texels.
     pub(super) fn byte_len(&self) -> usize {
-        self.buffer[0] as usize * self.buffer[1] as usize * 4
+        self.row_len() * self.buffer[1] as usize
     }
 }
 

@@ -7,7 +7,7 @@ use std::num::NonZeroU32;
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread;
 
-use foreframe_engine::{ColorPlane, StreamFormat};
+use foreframe_engine::{ColorPlane, Rect, StreamFormat};
 use softbuffer::{Context, SoftBufferError, Surface};
 use tracing::warn;
 use winit::event_loop::OwnedDisplayHandle;
@@ -15,7 +15,7 @@ use winit::window::Window as DesktopWindow;
 
 use super::placement::Placement;
 use super::shared::Shared;
-use super::texels::{ByteOrder, Texels};
+use super::texels::{ByteOrder, Picture, Texels};
 use super::{Closed, WindowError};
 
 /// Paints a window. Its thread ends when this is dropped and the display lets it.
@@ -106,19 +106,52 @@ fn paint_all(
     let context = Context::new(display)?;
     let mut surface = Surface::new(&context, window)?;
     let mut texels = Texels::new(format, ByteOrder::Bgrx);
-    let mut painted = None;
+    let (mut painted, mut row) = (None, Vec::new());
     while let Some(frame) = easel.take(painted.take()) {
         let placement = Placement::scaled([frame.width(), frame.height()], shared.size());
         let [width, height] =
             placement.buffer.map(|length| NonZeroU32::new(length).expect("a side is at least 1"));
         surface.resize(width, height)?;
         let mut buffer = surface.buffer_mut()?;
-        let drawn = texels.draw(&frame, &placement);
-        for (pixel, texel) in buffer.iter_mut().zip(drawn.as_chunks::<4>().0) {
-            *pixel = u32::from_le_bytes([texel[0], texel[1], texel[2], 0]);
-        }
+        paint(&texels.picture(&frame, &placement), &placement, &mut row, &mut buffer);
         buffer.present()?;
         painted = Some(frame);
     }
     Ok(())
+}
+
+/// Draws a picture to its place in a whole buffer, black around it, by way of `row`.
+fn paint(picture: &Picture<'_>, placement: &Placement, row: &mut Vec<u8>, buffer: &mut [u32]) {
+    let Rect { x, y, width, height } = placement.picture;
+    if [width, height] != placement.buffer {
+        buffer.fill(0);
+    }
+    row.resize(width as usize * 4, 0);
+    let rows = buffer.chunks_exact_mut(placement.buffer[0] as usize).skip(y as usize);
+    for (y, pixels) in (0..height).zip(rows) {
+        picture.draw_row(y, row);
+        let pixels = &mut pixels[x as usize..][..width as usize];
+        for (pixel, texel) in pixels.iter_mut().zip(row.as_chunks::<4>().0) {
+            *pixel = u32::from_le_bytes([texel[0], texel[1], texel[2], 0]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_is_painted_in_its_place_whatever_was_there_before() {
+        let format = StreamFormat::rgba8(2, 1);
+        let mut frame = ColorPlane::new(format.color, 2, 1);
+        frame.as_mut_bytes().copy_from_slice(&[1, 2, 3, 255, 4, 5, 6, 255]);
+        let placement = Placement::scaled([2, 1], [4, 4]);
+        let mut texels = Texels::new(&format, ByteOrder::Bgrx);
+        let mut buffer = [0xffff_ffff; 16];
+        paint(&texels.picture(&frame, &placement), &placement, &mut Vec::new(), &mut buffer);
+        let [dark, one, four] = [0, 0x01_02_03, 0x04_05_06];
+        let shown = [[dark; 4], [one, one, four, four], [one, one, four, four], [dark; 4]];
+        assert_eq!(buffer, *shown.as_flattened());
+    }
 }

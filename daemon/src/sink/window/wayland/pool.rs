@@ -1,8 +1,10 @@
 //! Memory that the compositor reads pictures from: one file in memory, cut into buffers.
 //!
 //! A picture is written with `pwrite`, not through a mapping: the compositor has the file as well
-//! and could write to it, so no slice of it is formed. What lies around the picture is zero from
-//! the start and is never written.
+//! and could write to it, so no slice of it is formed, and the engine cannot draw in it. A seal that
+//! keeps others from writing would keep most compositors from mapping it at all. So one copy
+//! remains, and what is to be converted is converted on the way. What lies around the picture is
+//! zero from the start.
 
 use std::fs::File;
 use std::io;
@@ -11,7 +13,7 @@ use std::os::unix::fs::FileExt as _;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use foreframe_engine::ColorPlane;
+use foreframe_engine::{ColorPlane, Rect};
 use foreframe_protocol::memory::create_memfd;
 use wayland_client::QueueHandle;
 use wayland_client::protocol::wl_buffer::WlBuffer;
@@ -19,11 +21,13 @@ use wayland_client::protocol::wl_shm::{Format, WlShm};
 
 use super::listener::Listener;
 use crate::sink::window::placement::Placement;
-use crate::sink::window::texels::{ByteOrder, Texels};
+use crate::sink::window::texels::{ByteOrder, Picture, Texels};
 
 /// Buffers of a window: one on the screen, one waiting for its refresh, one being written, and one
 /// that the compositor is slow to give back.
 pub(super) const BUFFERS: usize = 4;
+/// Bytes that are converted at once: they are still in the nearest cache when they are written.
+const BAND_BYTES: usize = 128 * 1024;
 
 /// The buffers of one size.
 #[derive(Debug)]
@@ -31,7 +35,12 @@ pub(super) struct Pool {
     file: File,
     pub(super) placement: Placement,
     buffers: Vec<Buffer>,
+    band: Band,
 }
+
+/// Rows of a buffer that are converted at once. What is beside the picture is zero and stays so.
+#[derive(Debug)]
+struct Band(Vec<u8>);
 
 /// One of them.
 #[derive(Debug)]
@@ -82,7 +91,7 @@ impl Pool {
         };
         let buffers = (0..count).map(buffer).collect();
         pool.destroy();
-        Ok(Self { file, placement, buffers })
+        Ok(Self { file, placement, buffers, band: Band::new(&placement) })
     }
 
     /// A buffer that the compositor has given back, or never had, by its number.
@@ -96,26 +105,103 @@ impl Pool {
 
     /// Writes a picture into a buffer that is free.
     pub(super) fn write(
-        &self,
+        &mut self,
         index: usize,
         texels: &mut Texels,
         frame: &ColorPlane,
     ) -> io::Result<()> {
         let start = (index * self.placement.byte_len()) as u64;
-        let picture = self.placement.picture;
-        let has_whole_rows = picture.width == self.placement.buffer[0];
-        let is_unscaled = [picture.width, picture.height] == [frame.width(), frame.height()];
-        match texels.as_they_are(frame).filter(|_| has_whole_rows && is_unscaled) {
-            Some(bytes) => {
-                let above = u64::from(picture.y) * u64::from(picture.width) * 4;
-                self.file.write_all_at(bytes, start + above)
-            }
-            None => self.file.write_all_at(texels.draw(frame, &self.placement), start),
-        }
+        let picture = texels.picture(frame, &self.placement);
+        self.band.write(&self.file, start, &self.placement, &picture)
     }
 
     /// Its buffers, for when another pool takes its place: the compositor may still have some.
     pub(super) fn into_buffers(self) -> Vec<Buffer> {
         self.buffers
+    }
+}
+
+impl Band {
+    fn new(placement: &Placement) -> Self {
+        let row = placement.row_len();
+        let rows = (BAND_BYTES / row).clamp(1, placement.picture.height.max(1) as usize);
+        Self(vec![0; rows * row])
+    }
+
+    /// Writes a picture to its place in the buffer that begins at `start`.
+    fn write(
+        &mut self,
+        file: &File,
+        start: u64,
+        placement: &Placement,
+        picture: &Picture<'_>,
+    ) -> io::Result<()> {
+        let Rect { x, y, width, height } = placement.picture;
+        let row_len = placement.row_len();
+        let at = |row: u32| start + (u64::from(y) + u64::from(row)) * row_len as u64;
+        if let Some(bytes) = picture.as_it_is().filter(|_| width == placement.buffer[0]) {
+            return file.write_all_at(bytes, at(0));
+        }
+        let mut first = 0;
+        while first < height {
+            let rows = self.0.chunks_exact_mut(row_len).zip(first..height);
+            let mut next = first;
+            for (row, y) in rows {
+                picture.draw_row(y, &mut row[x as usize * 4..][..width as usize * 4]);
+                next = y + 1;
+            }
+            file.write_all_at(&self.0[..(next - first) as usize * row_len], at(first))?;
+            first = next;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Read as _;
+
+    use foreframe_engine::StreamFormat;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn a_buffer_has_the_picture_in_its_place_and_black_around_it(
+            size in [1_u32..300, 1_u32..300],
+            window in [1_u32..900, 1_u32..900],
+            is_scaled: bool,
+            is_bgr: bool,
+            index in 0_u64..2,
+        ) {
+            let placement = match is_scaled {
+                true => Placement::scaled(size, window),
+                false => Placement::padded(size, window),
+            };
+            let mut frame = ColorPlane::new(StreamFormat::rgba8(1, 1).color, size[0], size[1]);
+            for (at, byte) in frame.as_mut_bytes().iter_mut().enumerate() {
+                *byte = u8::try_from(at % 251 + 1).expect("at most 251");
+            }
+            let order = if is_bgr { ByteOrder::Bgrx } else { ByteOrder::Rgbx };
+            let mut texels = Texels::new(&StreamFormat::rgba8(size[0], size[1]), order);
+            let mut file = File::from(create_memfd("test").expect("memory"));
+            let bytes = placement.byte_len();
+            file.set_len(2 * bytes as u64).expect("memory");
+            let picture = texels.picture(&frame, &placement);
+            let start = index * bytes as u64;
+            Band::new(&placement).write(&file, start, &placement, &picture).expect("memory");
+            let mut written = Vec::new();
+            file.read_to_end(&mut written).expect("memory");
+
+            let mut expected = vec![0; 2 * bytes];
+            let row_len = placement.row_len();
+            let Rect { x, y, width, height } = placement.picture;
+            for row in 0..height {
+                let from = start as usize + (y + row) as usize * row_len + x as usize * 4;
+                picture.draw_row(row, &mut expected[from..][..width as usize * 4]);
+            }
+            prop_assert!(written == expected, "{placement:?}");
+        }
     }
 }

@@ -141,7 +141,7 @@ impl WaylandSurface {
         if !self.surface.is_alive() || !self.has_fitting_pool([frame.width(), frame.height()]) {
             return false;
         }
-        let Some(pool) = &self.pool else { return false };
+        let Some(pool) = &mut self.pool else { return false };
         let Some(index) = pool.free() else {
             self.without_buffer += 1;
             return false;
