@@ -6,6 +6,7 @@ use foreframe_engine::Method;
 use foreframe_engine::backend::choice::BackendChoice;
 use foreframe_fixtures::{SceneInfo, Size};
 use foreframed::config::SinkSpec;
+use foreframed::hud::HudView;
 use foreframed::sink::window::WindowOptions;
 
 use crate::demo::{self, Settings};
@@ -52,6 +53,10 @@ pub struct Args {
     /// With --sink window: the monitor, by its name
     #[arg(long, value_name = "NAME")]
     pub monitor: Option<String>,
+    /// With --sink window: what to draw into the pictures, as for `foreframed`; `h` in the window
+    /// goes through the views
+    #[arg(long, value_name = "VIEW", default_value_t = HudView::Off)]
+    pub hud: HudView,
     /// Folder for the pictures and the numbers
     #[arg(long, value_name = "DIR", default_value = "foreframe-demo")]
     pub out: PathBuf,
@@ -71,7 +76,12 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
         method: args.method,
         backend: args.backend.clone(),
         sink: args.sink.clone(),
-        window: WindowOptions { is_fullscreen: args.fullscreen, monitor: args.monitor.clone() },
+        window: WindowOptions {
+            is_fullscreen: args.fullscreen,
+            monitor: args.monitor.clone(),
+            ..WindowOptions::default()
+        },
+        hud: args.hud,
         out: args.out.clone(),
     };
     let summary = demo::run(&settings, output)?;

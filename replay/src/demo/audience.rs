@@ -233,6 +233,7 @@ mod tests {
             method: Method::Linear,
             sink: foreframed::config::SinkSpec::Null,
             window: foreframed::sink::window::WindowOptions::default(),
+            hud: foreframed::hud::HudView::Off,
             out: PathBuf::new(),
         };
         let rehearsal = Rehearsal::render(&settings, &Output::new(true));

@@ -53,6 +53,7 @@ impl DaemonProcess {
             .args(["--refresh", &settings.refresh_hz.to_string()])
             .args(["--method", settings.method.name()])
             .args(["--backend", &settings.backend.to_string()])
+            .args(["--hud", settings.hud.name()])
             .args(["--log", "warn"])
             .args(["--with-parent", &std::process::id().to_string()])
             .stdin(Stdio::null())

@@ -24,6 +24,7 @@ use foreframe_engine::{Method, MonoSpan};
 use foreframe_fixtures::{SceneInfo, Size};
 use foreframed::clock;
 use foreframed::config::SinkSpec;
+use foreframed::hud::HudView;
 use foreframed::sink::window::WindowOptions;
 
 use crate::output::Output;
@@ -59,6 +60,8 @@ pub struct Settings {
     pub sink: SinkSpec,
     /// How its window opens, if that is the sink.
     pub window: WindowOptions,
+    /// What is drawn into the pictures of its window.
+    pub hud: HudView,
     /// Where the pictures and the summary go.
     pub out: PathBuf,
 }

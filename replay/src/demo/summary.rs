@@ -361,6 +361,7 @@ mod tests {
             method: foreframe_engine::Method::Linear,
             sink: SinkSpec::Shm,
             window: foreframed::sink::window::WindowOptions::default(),
+            hud: foreframed::hud::HudView::Off,
             out: out.to_owned(),
         }
     }
