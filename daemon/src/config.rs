@@ -20,7 +20,7 @@ use tracing_subscriber::EnvFilter;
 
 use crate::hud::HudView;
 use crate::profiles::{Profiles, UnknownProfile, Viewed};
-use crate::sink::window::WindowOptions;
+use crate::sink::window::{Layout, WindowOptions};
 
 /// Arguments of `foreframed` and of `foreframe serve`.
 #[derive(clap::Args, Deserialize, Clone, PartialEq, Debug, Default)]
@@ -41,6 +41,11 @@ pub struct Args {
     /// Monitor for windows, by its name; one that is not full screen opens there on X11 alone
     #[arg(long, value_name = "NAME")]
     pub monitor: Option<String>,
+    /// Where several streams are shown: single, each in a window of its own, or side-by-side, all in
+    /// one, on Wayland alone [default: single]
+    #[arg(long)]
+    #[serde(default, deserialize_with = "from_name")]
+    pub layout: Option<Layout>,
     /// Refresh rate of the output, 1 to 1000; a window has its display's [default: 120]
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub refresh: Option<f64>,
@@ -305,6 +310,7 @@ impl Args {
             sink: self.sink.or(file.sink),
             fullscreen: self.fullscreen || file.fullscreen,
             monitor: self.monitor.or(file.monitor),
+            layout: self.layout.or(file.layout),
             refresh: self.refresh.or(file.refresh),
             backend: self.backend.or(file.backend),
             method: self.method.or(file.method),
@@ -375,7 +381,11 @@ impl Args {
         Ok(Config {
             socket: self.socket,
             sink: self.sink.unwrap_or_default(),
-            window: WindowOptions { is_fullscreen: self.fullscreen, monitor: self.monitor },
+            window: WindowOptions {
+                is_fullscreen: self.fullscreen,
+                monitor: self.monitor,
+                layout: self.layout.unwrap_or_default(),
+            },
             refresh_interval,
             backend: self.backend.unwrap_or(BackendChoice::Auto),
             method: self.method.unwrap_or_default(),
@@ -441,6 +451,7 @@ impl Config {
             ("sink", self.sink != new.sink),
             ("fullscreen", self.window.is_fullscreen != new.window.is_fullscreen),
             ("monitor", self.window.monitor != new.window.monitor),
+            ("layout", self.window.layout != new.window.layout),
             ("refresh", self.refresh_interval != new.refresh_interval),
             ("backend", self.backend != new.backend),
             ("least-step", self.least_step_px.to_bits() != new.least_step_px.to_bits()),
@@ -498,11 +509,12 @@ mod tests {
     const PROFILES: &str = "../fixtures/profiles";
 
     /// Every option with a value that is not its default, by the name that flag and file share.
-    const EVERY_OPTION: [(&str, &str, &str); 20] = [
+    const EVERY_OPTION: [(&str, &str, &str); 21] = [
         ("socket", "/run/x", "'/run/x'"),
         ("sink", "png:out", "'png:out'"),
         ("fullscreen", "", "true"),
         ("monitor", "DP-1", "'DP-1'"),
+        ("layout", "side-by-side", "'side-by-side'"),
         ("refresh", "144", "144"),
         ("backend", "cpu", "'cpu'"),
         ("method", "hold", "'hold'"),

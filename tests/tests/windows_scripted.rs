@@ -6,14 +6,18 @@ mod scripted;
 use std::fs;
 use std::path::PathBuf;
 
-use daemon_fixture::child::{ChildProcess, run_if_asked};
+use daemon_fixture::child::{ChildProcess, LAYOUT, MONITOR, run_if_asked};
 use daemon_fixture::{Client, KeySource, private_folder};
 use foreframe_engine::MonoSpan;
 use foreframe_protocol::{DaemonMessage, DestroyStream, Presented};
 use foreframed::clock;
-use scripted::{Feedback, Script, Scripted};
+use scripted::{Feedback, Order, Script, Scripted, Seen};
 use tempfile::TempDir;
 
+/// Colour of the keys, red first, and as the compositor has it.
+const KEY: [u8; 4] = [200, 100, 50, 255];
+const KEY_SEEN: [u8; 3] = [50, 100, 200];
+const BLACK: [u8; 3] = [0; 3];
 /// Waiting this long means that something is broken.
 const PATIENCE: MonoSpan = MonoSpan::from_ms(60_000);
 
@@ -23,7 +27,7 @@ fn child_process() {
 }
 
 struct Stage {
-    _compositor: Scripted,
+    compositor: Scripted,
     _daemon: ChildProcess,
     client: Client,
     source: KeySource,
@@ -33,13 +37,45 @@ struct Stage {
 
 impl Stage {
     fn set(script: Script) -> Self {
+        Self::set_with(script, &[])
+    }
+
+    fn set_with(script: Script, more: &[(&'static str, &str)]) -> Self {
         let compositor = Scripted::start(script);
         let folder = private_folder();
         let [socket, log] = ["daemon.sock", "log"].map(|name| folder.path().join(name));
-        let daemon = ChildProcess::daemon_with_windows(&socket, &compositor.environment(), &log);
+        let mut environment = compositor.environment();
+        environment.extend(more.iter().map(|&(name, value)| (name, value.to_owned())));
+        let daemon = ChildProcess::daemon_with_windows(&socket, &environment, &log);
         let mut client = Client::connect(&socket);
         let source = client.open_stream(1, 64, 32);
-        Self { _compositor: compositor, _daemon: daemon, client, source, log, folder }
+        Self { compositor, _daemon: daemon, client, source, log, folder }
+    }
+
+    /// Submits keys until the compositor has seen what is wanted.
+    fn show_until_seen(&mut self, is_wanted: impl Fn(&[Seen]) -> bool) {
+        let patience = clock::now() + PATIENCE;
+        loop {
+            let seen = self.compositor.seen();
+            if is_wanted(&seen) {
+                return;
+            }
+            assert!(clock::now() < patience, "{seen:?}: {}", self.log());
+            self.client.submit(&mut self.source, KEY);
+            self.client.take_waiting();
+        }
+    }
+
+    /// Submits keys for so many refreshes, and says how many pictures were committed meanwhile.
+    fn commits_in(&mut self, refreshes: u64) -> u32 {
+        let commits =
+            |stage: &Self| stage.compositor.seen().iter().map(|it| it.commits).sum::<u32>();
+        let (from, before) = (self.compositor.ticks(), commits(self));
+        while self.compositor.ticks() < from + refreshes {
+            self.client.submit(&mut self.source, KEY);
+            self.client.take_waiting();
+        }
+        commits(self) - before
     }
 
     /// Submits keys until `is_enough` of those that were shown, or the log, and gives the former.
@@ -48,7 +84,7 @@ impl Stage {
         let mut shown = Vec::new();
         while !is_enough(&shown, &self.log()) {
             assert!(clock::now() < patience, "{} keys: {}", shown.len(), self.log());
-            self.client.submit(&mut self.source, [200, 100, 50, 255]);
+            self.client.submit(&mut self.source, KEY);
             shown.extend(self.client.take_waiting().into_iter().filter_map(|it| match it {
                 DaemonMessage::Presented(presented) => Some(presented),
                 _ => None,
@@ -138,5 +174,181 @@ fn a_compositor_that_dies_in_the_middle_takes_its_window_alone() {
     stage.show_until(|_, log| log.contains("window closes"));
     let shown = stage.show_until(|shown, _| shown.len() > 10);
     assert!(!shown.is_empty());
+    stage.strike();
+}
+
+#[test]
+fn a_picture_keeps_its_shape_in_a_window_of_any_size_and_scale() {
+    let mut stage = Stage::set(Script::GOOD);
+    // 64 x 32 in a square: bars above and below.
+    stage.compositor.order(Order::Resize([300, 300]));
+    stage.show_until_seen(|seen| {
+        seen.iter().any(|it| {
+            it.destination == Some([300, 300])
+                && it.buffer == [64, 64]
+                && it.scale == 1
+                && (it.corner, it.middle) == (BLACK, KEY_SEEN)
+        })
+    });
+    // In a longer one they are at the sides, whatever the scale.
+    stage.compositor.order(Order::Scale(2));
+    stage.compositor.order(Order::Resize([400, 100]));
+    stage.show_until_seen(|seen| {
+        seen.iter().any(|it| {
+            it.destination == Some([400, 100])
+                && it.buffer == [128, 32]
+                && it.scale == 1
+                && (it.corner, it.middle) == (BLACK, KEY_SEEN)
+        })
+    });
+    stage.strike();
+}
+
+#[test]
+fn where_nobody_stretches_buffers_they_have_the_pixels_of_the_window() {
+    let mut stage = Stage::set(Script { has_viewporter: false, ..Script::GOOD });
+    stage.compositor.order(Order::Resize([300, 200]));
+    let is_drawn = |it: &Seen| (it.corner, it.middle) == (BLACK, KEY_SEEN);
+    stage.show_until_seen(|seen| {
+        seen.iter().any(|it| it.buffer == [300, 200] && it.scale == 1 && is_drawn(it))
+    });
+    stage.compositor.order(Order::Scale(2));
+    stage.show_until_seen(|seen| {
+        seen.iter().any(|it| it.buffer == [600, 400] && it.scale == 2 && is_drawn(it))
+    });
+    stage.strike();
+}
+
+#[test]
+fn f_leaves_full_screen_and_enters_it_again_h_goes_through_the_hud_and_q_closes() {
+    let mut stage = Stage::set(Script::GOOD);
+    stage.show_until_seen(|seen| seen.iter().any(|it| it.fills.is_some()));
+    stage.compositor.order(Order::Press('f'));
+    stage.show_until_seen(|seen| seen.iter().any(|it| it.fills.is_none()));
+    stage.compositor.order(Order::Press('f'));
+    stage.show_until_seen(|seen| seen.iter().any(|it| it.fills.is_some()));
+    stage.compositor.order(Order::Press('h'));
+    stage.show_until(|_, log| log.contains("hud view=stats"));
+    stage.compositor.order(Order::Press('q'));
+    stage.show_until(|_, log| log.contains("window closes why=ByUser"));
+    stage.strike();
+}
+
+#[test]
+fn a_monitor_is_chosen_by_its_name() {
+    for (index, name) in scripted::OUTPUTS.into_iter().enumerate() {
+        let mut stage = Stage::set_with(Script::GOOD, &[(MONITOR, name)]);
+        stage.show_until_seen(|seen| seen.iter().any(|it| it.fills == Some(Some(index))));
+        stage.strike();
+    }
+}
+
+#[test]
+fn a_window_that_nobody_sees_costs_a_few_frames_a_second_until_somebody_does() {
+    let mut stage = Stage::set(Script::GOOD);
+    stage.show_until(|shown, _| shown.len() > 60);
+    stage.compositor.order(Order::Show(false));
+    // Before they are found to be in vain, some are.
+    stage.commits_in(60);
+    let hidden = stage.commits_in(100);
+    assert!(hidden < 30, "{hidden} pictures in a second that nobody saw");
+    stage.compositor.order(Order::Show(true));
+    stage.show_until(|shown, _| shown.len() > 60);
+    stage.strike();
+}
+
+#[test]
+fn another_mode_is_followed_and_the_application_hears_of_it() {
+    let mut stage = Stage::set(Script::GOOD);
+    stage.show_until(|shown, _| shown.len() > 60);
+    stage.compositor.order(Order::Mode(50_000));
+    let is_20_ms = |ns: u64| ns.abs_diff(20_000_000) < 600_000;
+    let patience = clock::now() + PATIENCE;
+    loop {
+        assert!(clock::now() < patience, "{}", stage.log());
+        stage.client.submit(&mut stage.source, KEY);
+        let heard = stage.client.take_waiting();
+        if heard
+            .iter()
+            .any(|it| matches!(it, DaemonMessage::Pacing(it) if is_20_ms(it.refresh_interval_ns)))
+        {
+            break;
+        }
+    }
+    stage.show_until(|shown, _| shown.len() > 20);
+    stage.strike();
+}
+
+#[test]
+fn a_compositor_that_is_asleep_for_a_while_stops_nobody_and_is_followed_when_it_wakes() {
+    let mut stage = Stage::set(Script::GOOD);
+    stage.show_until(|shown, _| shown.len() > 60);
+    stage.compositor.order(Order::Freeze(true));
+    // Keys come back all the while.
+    stage.commits_in(200);
+    stage.compositor.order(Order::Freeze(false));
+    let woken_at = clock::now().as_ns();
+    let is_new = |it: &&Presented| it.presented_at_ns > woken_at;
+    stage.show_until(|shown, _| shown.iter().filter(is_new).count() > 60);
+    stage.strike();
+}
+
+/// Whether a key of this stream was shown, by the compositor's word.
+fn is_shown_of(message: &DaemonMessage, stream: u32) -> bool {
+    let DaemonMessage::Presented(it) = message else { return false };
+    it.stream == stream && it.presented_at_ns != it.present_at_ns
+}
+
+const SIDE_BY_SIDE: &[(&str, &str)] = &[(LAYOUT, "side-by-side")];
+
+#[test]
+fn two_streams_are_side_by_side_in_one_window_and_the_one_that_is_left_gets_all_of_it() {
+    let mut stage = Stage::set_with(Script::GOOD, SIDE_BY_SIDE);
+    let mut second = stage.client.open_stream(2, 32, 32);
+    stage.compositor.order(Order::Resize([400, 100]));
+    let place = |it: &Seen| (it.position, it.destination, it.buffer);
+    let halves = [([0, 0], Some([200, 100]), [64, 32]), ([200, 0], Some([200, 100]), [64, 32])];
+    let patience = clock::now() + PATIENCE;
+    loop {
+        let seen = stage.compositor.seen();
+        let mut cells: Vec<_> = seen.iter().filter(|it| it.is_cell).collect();
+        cells.sort_by_key(|it| it.position);
+        if cells.len() == 2
+            && [place(cells[0]), place(cells[1])] == halves
+            && cells[0].middle == KEY_SEEN
+            && (cells[1].corner, cells[1].middle) == (BLACK, [3, 2, 1])
+        {
+            assert_eq!(seen.len(), 3, "one window for both: {seen:?}");
+            break;
+        }
+        assert!(clock::now() < patience, "{seen:?}: {}", stage.log());
+        stage.client.submit(&mut stage.source, KEY);
+        stage.client.submit(&mut second, [1, 2, 3, 255]);
+        stage.client.take_waiting();
+    }
+    stage.client.send(DestroyStream { stream: 2 });
+    let whole = ([0, 0], Some([400, 100]), [128, 32]);
+    stage.show_until_seen(|seen| {
+        let mut cells = seen.iter().filter(|it| it.is_cell);
+        cells.next().is_some_and(|it| place(it) == whole) && cells.next().is_none()
+    });
+    stage.strike();
+}
+
+#[test]
+fn a_stream_whose_frames_are_stuck_does_not_delay_the_one_beside_it() {
+    let script = Script { starves_first_cell: true, ..Script::GOOD };
+    let mut stage = Stage::set_with(script, SIDE_BY_SIDE);
+    stage.show_until(|_, log| log.contains("is_taken=false"));
+    let mut second = stage.client.open_stream(2, 64, 32);
+    let patience = clock::now() + PATIENCE;
+    let mut shown = 0;
+    while shown < 60 {
+        assert!(clock::now() < patience, "{shown} keys: {}", stage.log());
+        stage.client.submit(&mut stage.source, KEY);
+        stage.client.submit(&mut second, KEY);
+        let heard = stage.client.take_waiting();
+        shown += heard.iter().filter(|it| is_shown_of(it, 2)).count();
+    }
     stage.strike();
 }

@@ -166,7 +166,7 @@ impl Server {
     fn window(&self, format: &EngineFormat, ordinal: u64) -> Option<(WindowOpener, WindowConfig)> {
         let opener = self.windows.as_ref().map(WindowSystem::opener)?;
         let title = format!("Foreframe {}", ordinal + 1);
-        Some((opener, WindowConfig { format: *format, title }))
+        Some((opener, WindowConfig { format: *format, title, ordinal }))
     }
 
     /// Passes on what a stream's thread tells.

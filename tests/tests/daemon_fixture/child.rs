@@ -18,6 +18,9 @@ const ROLE: &str = "FOREFRAME_TEST_ROLE";
 const SOCKET: &str = "FOREFRAME_TEST_SOCKET";
 const RECORD: &str = "FOREFRAME_TEST_RECORD";
 const SINK: &str = "FOREFRAME_TEST_SINK";
+/// `--monitor NAME` or `--layout NAME`, if it is to have one of them.
+pub(crate) const MONITOR: &str = "FOREFRAME_TEST_MONITOR";
+pub(crate) const LAYOUT: &str = "FOREFRAME_TEST_LAYOUT";
 const REFRESH: &str = "FOREFRAME_TEST_REFRESH";
 /// What a daemon with windows logs.
 const LOG: &str = "info,foreframed::stream::display=trace";
@@ -58,7 +61,17 @@ pub(crate) fn run_if_asked() {
             let log = Some(if sink.is_some() { LOG } else { "warn" }.to_owned());
             let fullscreen = sink.is_some();
             let refresh = std::env::var(REFRESH).ok().map(|hz| hz.parse().unwrap());
-            let args = Args { socket, record, sink, log, fullscreen, refresh, ..Args::default() };
+            let args = Args {
+                socket,
+                record,
+                sink,
+                log,
+                fullscreen,
+                refresh,
+                monitor: std::env::var(MONITOR).ok(),
+                layout: std::env::var(LAYOUT).ok().map(|layout| layout.parse().unwrap()),
+                ..Args::default()
+            };
             match foreframed::run(args) {
                 Ok(()) => 0,
                 Err(error) => {

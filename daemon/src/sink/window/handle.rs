@@ -40,15 +40,15 @@ impl Window {
         wake: impl Fn() + Send + Sync + 'static,
     ) -> Result<Self, WindowError> {
         let shared = Arc::new(Shared::new(wake));
-        let Opened { window, display, refresh_interval } = opener.open(config, &shared)?;
+        let Opened { window, display, refresh_interval, role } = opener.open(config, &shared)?;
         let id = window.id();
         let surface = match Guest::join(&window, &display) {
-            Some(guest) => WaylandSurface::new(guest, &config.format, Arc::clone(&shared))
+            Some(guest) => WaylandSurface::new(guest, &config.format, Arc::clone(&shared), role)
                 .map(|surface| Surface::Wayland(Box::new(surface))),
             None => Painter::start(window, display, &config.format, Arc::clone(&shared))
                 .map(Surface::Software),
         };
-        let surface = surface.inspect_err(|_| opener.close(id))?;
+        let surface = surface.inspect_err(|_| opener.close(id, &shared))?;
         Ok(Self { surface, shared, refresh_interval, id, opener: opener.clone() })
     }
 
@@ -88,6 +88,6 @@ impl Window {
 
 impl Drop for Window {
     fn drop(&mut self) {
-        self.opener.close(self.id);
+        self.opener.close(self.id, &self.shared);
     }
 }

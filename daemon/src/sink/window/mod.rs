@@ -5,7 +5,8 @@
 //! never waits for the display: on Wayland ([`wayland`]) it copies the picture into a shared-memory
 //! buffer that is free and asks for presentation feedback just before the commit; elsewhere
 //! ([`software`]) it leaves it to a thread that paints. What happens to a window and to its frames
-//! comes as [`WindowEvent`]s, and each wakes the stream.
+//! comes as [`WindowEvent`]s, and each wakes the stream. What the desktop calls a window can be
+//! shared by several streams ([`host`]); each has its part of it as if that were a window.
 //!
 //! What a display lacks is done without, and named ([`Feedback`]): without presentation feedback,
 //! or with one that never answers, frames are paced by frame callbacks, and without those by a
@@ -13,6 +14,7 @@
 //! are.
 
 mod handle;
+mod host;
 mod placement;
 mod shared;
 mod software;
@@ -20,7 +22,8 @@ mod system;
 mod texels;
 mod wayland;
 
-use std::io;
+use std::str::FromStr;
+use std::{fmt, io};
 
 use foreframe_engine::StreamFormat;
 
@@ -37,6 +40,46 @@ pub struct WindowOptions {
     /// Name of the monitor to be shown on. A window that is not full screen opens there where the
     /// window system lets applications choose, which Wayland does not.
     pub monitor: Option<String>,
+    /// Where several streams are shown.
+    pub layout: Layout,
+}
+
+/// Where several streams are shown.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Layout {
+    /// Each in a window of its own.
+    #[default]
+    Single,
+    /// All in one window, in columns of the same width. On Wayland alone: elsewhere each gets a
+    /// window.
+    SideBySide,
+}
+
+impl Layout {
+    /// Name on the command line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Single => "single",
+            Self::SideBySide => "side-by-side",
+        }
+    }
+}
+
+impl fmt::Display for Layout {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Layout {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        let all = [Self::Single, Self::SideBySide];
+        let found = all.into_iter().find(|layout| layout.name() == name);
+        found.ok_or_else(|| format!("expected single or side-by-side, found `{name}`"))
+    }
 }
 
 /// One window to open.
@@ -46,6 +89,8 @@ pub struct WindowConfig {
     pub format: StreamFormat,
     /// What the desktop calls it.
     pub title: String,
+    /// In a window that several share, those with a lower number are to the left.
+    pub ordinal: u64,
 }
 
 /// Where a window knows from when its frames were shown.

@@ -2,14 +2,35 @@
 
 use std::fmt;
 use std::mem;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use winit::dpi::{LogicalSize, PhysicalSize};
 
 use super::{Closed, WindowEvent};
 
-/// A mailbox of events, and the window's size.
+/// A part of the desktop's window: one of `count` columns of the same width, from the left.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct Column {
+    pub(super) index: u32,
+    pub(super) count: u32,
+}
+
+impl Column {
+    /// All of it.
+    pub(super) const WHOLE: Self = Self { index: 0, count: 1 };
+
+    /// Where it begins in a window of this width, and its own width.
+    fn of(self, width: u32) -> [u32; 2] {
+        let at = |index: u32| {
+            let at = u64::from(width) * u64::from(index) / u64::from(self.count.max(1));
+            u32::try_from(at).unwrap_or(width)
+        };
+        [at(self.index), at(self.index + 1) - at(self.index)]
+    }
+}
+
+/// A mailbox of events, and the place of the stream's window, which may be a part of the desktop's.
 pub(super) struct Shared {
     events: Mutex<Vec<WindowEvent>>,
     wake: Box<dyn Fn() + Send + Sync>,
@@ -17,6 +38,8 @@ pub(super) struct Shared {
     size: AtomicU64,
     /// The same in the desktop's own units.
     logical_size: AtomicU64,
+    /// Where it begins in the desktop's window, in the same units.
+    left: AtomicU32,
     is_closed: AtomicBool,
 }
 
@@ -34,6 +57,7 @@ impl Shared {
             wake: Box::new(wake),
             size: AtomicU64::new(0),
             logical_size: AtomicU64::new(0),
+            left: AtomicU32::new(0),
             is_closed: AtomicBool::new(false),
         }
     }
@@ -59,11 +83,20 @@ impl Shared {
         self.is_closed.load(Ordering::Relaxed)
     }
 
-    /// The window has `size` pixels, and `scale` of them for each of the desktop's own units.
-    pub(super) fn set_size(&self, size: PhysicalSize<u32>, scale: f64) {
+    /// The desktop's window has `size` pixels, and `scale` of them for each of the desktop's own
+    /// units; `column` of it is ours.
+    pub(super) fn set_place(&self, size: PhysicalSize<u32>, scale: f64, column: Column) {
         let logical: LogicalSize<u32> = size.to_logical(scale);
-        self.size.store(packed(size.into()), Ordering::Relaxed);
-        self.logical_size.store(packed(logical.into()), Ordering::Relaxed);
+        let [_, width] = column.of(size.width);
+        let [left, logical_width] = column.of(logical.width);
+        self.left.store(left, Ordering::Relaxed);
+        self.size.store(packed([width, size.height]), Ordering::Relaxed);
+        self.logical_size.store(packed([logical_width, logical.height]), Ordering::Relaxed);
+    }
+
+    /// Where the window begins in the desktop's, in the desktop's own units.
+    pub(super) fn left(&self) -> u32 {
+        self.left.load(Ordering::Relaxed)
     }
 
     /// Columns and rows of the window, in pixels.
@@ -84,4 +117,34 @@ fn packed([width, height]: [u32; 2]) -> u64 {
 #[expect(clippy::cast_possible_truncation, reason = "each half has 32 bits")]
 fn unpacked(size: u64) -> [u32; 2] {
     [(size >> 32) as u32, size as u32]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_fill_the_window_side_by_side() {
+        for count in 1..5 {
+            for width in [1, 7, 640, 1281] {
+                let columns = (0..count).map(|index| Column { index, count }.of(width));
+                let end = columns.fold(0, |end, [left, across]| {
+                    assert_eq!(left, end, "column {left} of {width} in {count}");
+                    left + across
+                });
+                assert_eq!(end, width);
+            }
+        }
+        assert_eq!(Column { index: 1, count: 2 }.of(1280), [640, 640]);
+    }
+
+    #[test]
+    fn a_place_is_in_pixels_and_in_the_desktops_units() {
+        let shared = Shared::new(|| {});
+        shared.set_place(PhysicalSize::new(1600, 600), 2.0, Column { index: 1, count: 2 });
+        assert_eq!(
+            (shared.size(), shared.logical_size(), shared.left()),
+            ([800, 600], [400, 300], 400)
+        );
+    }
 }

@@ -22,11 +22,13 @@ use winit::event_loop::{
 };
 use winit::keyboard::{Key, NamedKey};
 use winit::monitor::MonitorHandle;
-use winit::platform::wayland::EventLoopBuilderExtWayland as _;
+use winit::platform::wayland::{ActiveEventLoopExtWayland as _, EventLoopBuilderExtWayland as _};
 use winit::window::{Fullscreen, Window as DesktopWindow, WindowAttributes, WindowId};
 
+use super::host::Host;
 use super::shared::Shared;
-use super::{Closed, WindowConfig, WindowError, WindowEvent, WindowOptions};
+use super::wayland::Role;
+use super::{Closed, Layout, WindowConfig, WindowError, WindowEvent, WindowOptions};
 use crate::stream::core::Told;
 
 /// Time that a display has to answer. A busy one takes a few hundred milliseconds.
@@ -63,13 +65,14 @@ pub(super) struct Opened {
     pub(super) display: OwnedDisplayHandle,
     /// Announced refresh interval of its monitor.
     pub(super) refresh_interval: Option<MonoSpan>,
+    pub(super) role: Role,
 }
 
 /// What other threads ask for.
 #[derive(Debug)]
 enum Request {
     Open(WindowConfig, Arc<Shared>, SyncSender<Result<Opened, WindowError>>),
-    Close(WindowId),
+    Close(WindowId, Arc<Shared>),
     End,
 }
 
@@ -132,8 +135,8 @@ impl WindowOpener {
         }
     }
 
-    pub(super) fn close(&self, window: WindowId) {
-        if self.proxy.send_event(Request::Close(window)).is_err() {
+    pub(super) fn close(&self, window: WindowId, shared: &Arc<Shared>) {
+        if self.proxy.send_event(Request::Close(window, Arc::clone(shared))).is_err() {
             debug!("a window was gone before it was closed");
         }
     }
@@ -169,21 +172,14 @@ type Start = (Sender<Result<EventLoopProxy<Request>, WindowError>>, EventLoopPro
 /// Everything that the thread knows.
 struct Desktop {
     options: WindowOptions,
-    windows: BTreeMap<WindowId, Known>,
+    windows: BTreeMap<WindowId, Host>,
     /// Until the display has said which monitors there are.
     start: Option<Start>,
 }
 
-/// A window that is open.
-struct Known {
-    window: Arc<DesktopWindow>,
-    shared: Arc<Shared>,
-    refresh_interval: Option<MonoSpan>,
-}
-
 impl Drop for Desktop {
     fn drop(&mut self) {
-        self.windows.values().for_each(|known| known.shared.close(Closed::WithDisplay));
+        self.windows.values().for_each(|host| host.close(Closed::WithDisplay));
     }
 }
 
@@ -200,45 +196,45 @@ impl ApplicationHandler<Request> for Desktop {
     fn user_event(&mut self, display: &ActiveEventLoop, request: Request) {
         match request {
             Request::Open(config, shared, reply) => {
-                let opened = self.open(display, &config, shared);
+                let opened = self.open(display, &config, &shared);
                 if let Err(unwanted) = reply.send(opened)
                     && let Ok(Opened { window, .. }) = unwanted.0
                 {
-                    self.windows.remove(&window.id());
+                    self.close(window.id(), &shared);
                 }
             }
-            Request::Close(window) => drop(self.windows.remove(&window)),
+            Request::Close(window, shared) => self.close(window, &shared),
             Request::End => display.exit(),
         }
     }
 
     fn window_event(&mut self, _: &ActiveEventLoop, id: WindowId, event: DesktopEvent) {
-        let Some(Known { window, shared, .. }) = self.windows.get(&id) else { return };
+        let Some(host) = self.windows.get_mut(&id) else { return };
         match event {
-            DesktopEvent::CloseRequested => shared.close(Closed::ByUser),
-            DesktopEvent::Destroyed => shared.close(Closed::WithDisplay),
-            DesktopEvent::Resized(size) => shared.set_size(size, window.scale_factor()),
+            DesktopEvent::CloseRequested => host.close(Closed::ByUser),
+            DesktopEvent::Destroyed => host.close(Closed::WithDisplay),
+            DesktopEvent::Resized(_) => host.arrange(),
             DesktopEvent::ScaleFactorChanged { scale_factor, .. } => {
                 debug!(scale_factor, "the window's scale has changed");
-                shared.set_size(window.inner_size(), scale_factor);
+                host.arrange();
             }
             DesktopEvent::Occluded(is_hidden) => {
-                shared.tell(WindowEvent::Told(Told::Visible(!is_hidden)));
+                host.tell(WindowEvent::Told(Told::Visible(!is_hidden)));
             }
             DesktopEvent::KeyboardInput { event, is_synthetic: false, .. } => {
-                on_key(window, shared, &event);
+                on_key(host, &event);
             }
             _ => {}
         }
     }
 
     fn about_to_wait(&mut self, display: &ActiveEventLoop) {
-        for known in self.windows.values_mut() {
-            let interval = known.window.current_monitor().as_ref().and_then(refresh_interval);
-            if interval != known.refresh_interval {
-                known.refresh_interval = interval;
+        for host in self.windows.values_mut() {
+            let interval = host.window.current_monitor().as_ref().and_then(refresh_interval);
+            if interval != host.refresh_interval {
+                host.refresh_interval = interval;
                 if let Some(interval) = interval {
-                    known.shared.tell(WindowEvent::Told(Told::Mode(interval)));
+                    host.tell(WindowEvent::Told(Told::Mode(interval)));
                 }
             }
         }
@@ -254,8 +250,38 @@ impl Desktop {
         &mut self,
         display: &ActiveEventLoop,
         config: &WindowConfig,
-        shared: Arc<Shared>,
+        shared: &Arc<Shared>,
     ) -> Result<Opened, WindowError> {
+        let is_shared = self.shares_windows(display);
+        let role = if is_shared { Role::Part } else { Role::Whole };
+        let host = match self.windows.values_mut().next().filter(|_| is_shared) {
+            Some(host) => host,
+            None => self.open_host(display, config, is_shared)?,
+        };
+        host.add(Arc::clone(shared), config.clone());
+        Ok(Opened {
+            window: Arc::clone(&host.window),
+            display: display.owned_display_handle(),
+            refresh_interval: host.refresh_interval,
+            role,
+        })
+    }
+
+    /// Whether all streams are to be in one window, and can be.
+    fn shares_windows(&mut self, display: &ActiveEventLoop) -> bool {
+        if self.options.layout == Layout::SideBySide && !display.is_wayland() {
+            warn!("streams are side by side on Wayland alone; each gets a window");
+            self.options.layout = Layout::Single;
+        }
+        self.options.layout == Layout::SideBySide
+    }
+
+    fn open_host(
+        &mut self,
+        display: &ActiveEventLoop,
+        config: &WindowConfig,
+        is_shared: bool,
+    ) -> Result<&mut Host, WindowError> {
         let monitor = find_monitor(display, self.options.monitor.as_deref())?;
         let size = PhysicalSize::new(config.format.width, config.format.height);
         let mut attributes =
@@ -267,7 +293,6 @@ impl Desktop {
         }
         let window = display.create_window(attributes);
         let window = Arc::new(window.map_err(|error| WindowError::Refused(error.to_string()))?);
-        shared.set_size(window.inner_size(), window.scale_factor());
         let monitor = window.current_monitor().or_else(|| display.available_monitors().next());
         let refresh_interval = monitor.as_ref().and_then(refresh_interval);
         info!(
@@ -276,27 +301,36 @@ impl Desktop {
             scale_factor = window.scale_factor(),
             "window opens"
         );
-        let known = Known { window: Arc::clone(&window), shared, refresh_interval };
-        self.windows.insert(window.id(), known);
-        Ok(Opened { window, display: display.owned_display_handle(), refresh_interval })
+        let id = window.id();
+        let host = match is_shared {
+            true => Host::for_several(window, &display.owned_display_handle(), refresh_interval)?,
+            false => Host::new(window, refresh_interval),
+        };
+        Ok(self.windows.entry(id).or_insert(host))
+    }
+
+    fn close(&mut self, window: WindowId, shared: &Arc<Shared>) {
+        if self.windows.get_mut(&window).is_some_and(|host| !host.remove(shared)) {
+            self.windows.remove(&window);
+        }
     }
 }
 
-fn on_key(window: &DesktopWindow, shared: &Shared, event: &KeyEvent) {
+fn on_key(host: &Host, event: &KeyEvent) {
     if event.state != ElementState::Pressed || event.repeat {
         return;
     }
     match &event.logical_key {
-        Key::Named(NamedKey::Escape) => shared.close(Closed::ByUser),
+        Key::Named(NamedKey::Escape) => host.close(Closed::ByUser),
         Key::Character(text) => match text.to_lowercase().as_str() {
-            "q" => shared.close(Closed::ByUser),
-            "f" => window.set_fullscreen(match window.fullscreen() {
+            "q" => host.close(Closed::ByUser),
+            "f" => host.window.set_fullscreen(match host.window.fullscreen() {
                 Some(_) => None,
                 None => Some(Fullscreen::Borderless(None)),
             }),
             other => {
                 if let Some(key) = other.chars().next() {
-                    shared.tell(WindowEvent::Key(key));
+                    host.tell(WindowEvent::Key(key));
                 }
             }
         },

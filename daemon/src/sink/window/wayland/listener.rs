@@ -14,9 +14,14 @@ use tracing::{debug, warn};
 use wayland_client::globals::GlobalListContents;
 use wayland_client::protocol::wl_buffer::{self, WlBuffer};
 use wayland_client::protocol::wl_callback::{self, WlCallback};
+use wayland_client::protocol::wl_compositor::WlCompositor;
+use wayland_client::protocol::wl_region::WlRegion;
 use wayland_client::protocol::wl_registry::{self, WlRegistry};
 use wayland_client::protocol::wl_shm::{self, WlShm};
 use wayland_client::protocol::wl_shm_pool::WlShmPool;
+use wayland_client::protocol::wl_subcompositor::WlSubcompositor;
+use wayland_client::protocol::wl_subsurface::WlSubsurface;
+use wayland_client::protocol::wl_surface::WlSurface;
 use wayland_client::{Connection, Dispatch, EventQueue, QueueHandle, WEnum, delegate_noop};
 use wayland_protocols::wp::presentation_time::client::wp_presentation::{self, WpPresentation};
 use wayland_protocols::wp::presentation_time::client::wp_presentation_feedback::{
@@ -288,5 +293,10 @@ impl Dispatch<WlRegistry, GlobalListContents> for Listener {
 }
 
 delegate_noop!(Listener: ignore WlShmPool);
+delegate_noop!(Listener: ignore WlCompositor);
+delegate_noop!(Listener: ignore WlRegion);
+delegate_noop!(Listener: ignore WlSubcompositor);
+delegate_noop!(Listener: ignore WlSubsurface);
+delegate_noop!(Listener: ignore WlSurface);
 delegate_noop!(Listener: ignore WpViewporter);
 delegate_noop!(Listener: ignore WpViewport);

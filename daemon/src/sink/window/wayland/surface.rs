@@ -19,6 +19,7 @@ use wayland_protocols::wp::viewporter::client::wp_viewport::WpViewport;
 use wayland_protocols::wp::viewporter::client::wp_viewporter::WpViewporter;
 
 use super::answers::Answers;
+use super::cell::{Cell, Role};
 use super::guest::{Anchor, Guest};
 use super::listener::Listener;
 use super::pool::{Buffer, Pool};
@@ -48,6 +49,8 @@ pub(in crate::sink::window) struct WaylandSurface {
     /// Pictures for which no buffer was free.
     without_buffer: u64,
     surface: WlSurface,
+    /// Where that is inside the window's.
+    cell: Option<Cell>,
     connection: Connection,
     /// After everything that is on the connection.
     _anchor: Arc<Anchor>,
@@ -79,6 +82,7 @@ impl WaylandSurface {
         guest: Guest,
         format: &StreamFormat,
         shared: Arc<Shared>,
+        role: Role,
     ) -> Result<Self, WindowError> {
         let Guest { surface, connection, anchor } = guest;
         let anchor = Arc::new(anchor);
@@ -92,14 +96,14 @@ impl WaylandSurface {
             let listener = Listener::new(Arc::clone(&shared), Arc::clone(&answers));
             thread::Builder::new().name("foreframe-listener".to_owned()).spawn(move || {
                 let _anchor = anchor;
-                if let Some((queue, listener)) = bind(connection, &surface, listener, &tell) {
+                if let Some((queue, listener)) = bind(connection, &surface, role, listener, &tell) {
                     drop((surface, tell));
                     listener.listen(queue, &is_ending);
                 }
             })?
         };
-        let globals = match told.recv_timeout(ANSWER_WITHIN) {
-            Ok(globals) => globals?,
+        let (globals, cell) = match told.recv_timeout(ANSWER_WITHIN) {
+            Ok(found) => found?,
             Err(RecvTimeoutError::Timeout) => {
                 is_ending.store(true, Ordering::Relaxed);
                 return Err(WindowError::NoAnswer("none in 5 s"));
@@ -110,6 +114,10 @@ impl WaylandSurface {
         };
         *answers.lock().unwrap_or_else(PoisonError::into_inner) =
             Answers::new(globals.presentation.is_some());
+        let (surface, cell) = match cell {
+            Some((surface, cell)) => (surface, Some(cell)),
+            None => (surface, None),
+        };
         debug!(order = ?globals.order, stretch = ?globals.stretch, "surface");
         Ok(Self {
             shared,
@@ -123,6 +131,7 @@ impl WaylandSurface {
             logical_size: [0; 2],
             without_buffer: 0,
             surface,
+            cell,
             connection,
             _anchor: anchor,
         })
@@ -213,7 +222,7 @@ impl WaylandSurface {
         }
     }
 
-    fn commit(&self, index: usize) -> bool {
+    fn commit(&mut self, index: usize) -> bool {
         let Some(pool) = &self.pool else { return false };
         let Buffer { proxy, is_busy } = pool.buffer(index);
         is_busy.store(true, Ordering::Relaxed);
@@ -221,6 +230,9 @@ impl WaylandSurface {
         self.surface.attach(Some(proxy), 0, 0);
         self.surface.damage_buffer(0, 0, width, height);
         self.surface.commit();
+        if let Some(cell) = &mut self.cell {
+            cell.put(self.shared.left());
+        }
         match self.connection.flush() {
             Ok(()) => true,
             // The rest goes out with the next frame.
@@ -247,6 +259,9 @@ impl Drop for WaylandSurface {
         if let Stretch::ByUs(viewport) = &self.globals.stretch {
             viewport.destroy();
         }
+        if let Some(cell) = &self.cell {
+            cell.remove(&self.surface);
+        }
         if let Some(presentation) = &self.globals.presentation {
             presentation.destroy();
         }
@@ -262,13 +277,16 @@ impl Drop for WaylandSurface {
 }
 
 type Bound = (EventQueue<Listener>, Listener);
+/// What the compositor offers, and the surface inside the window's where one was asked for.
+type Found = (Globals, Option<(WlSurface, Cell)>);
 
 /// Binds what the surface needs, tells it, and gives back what goes on listening.
 fn bind(
     connection: Connection,
-    surface: &WlSurface,
+    window: &WlSurface,
+    role: Role,
     mut listener: Listener,
-    tell: &SyncSender<Result<Globals, WindowError>>,
+    tell: &SyncSender<Result<Found, WindowError>>,
 ) -> Option<Bound> {
     let found = registry_queue_init::<Listener>(&connection)
         .map_err(|error| WindowError::NoDisplay(error.to_string()))
@@ -281,8 +299,14 @@ fn bind(
                 list.contents().with_list(|all| all.iter().any(|one| one.interface == name))
             };
             let viewporter: Option<WpViewporter> = list.bind(&handle, 1..=1, ()).ok();
+            let cell = match role {
+                Role::Whole => None,
+                Role::Part => Some(Cell::new(&list, &handle, window)?),
+            };
+            let surface = cell.as_ref().map_or(window, |(surface, _)| surface);
             let stretch = match viewporter {
-                Some(_) if has(FRACTIONAL_SCALE) => Stretch::ByWinit,
+                None if cell.is_some() => return Err(WindowError::Lacks("wp_viewporter")),
+                Some(_) if cell.is_none() && has(FRACTIONAL_SCALE) => Stretch::ByWinit,
                 Some(viewporter) => Stretch::ByUs(viewporter.get_viewport(surface, &handle, ())),
                 None => Stretch::No,
             };
@@ -291,11 +315,11 @@ fn bind(
                 .roundtrip(&mut listener)
                 .map_err(|error| WindowError::NoDisplay(error.to_string()))?;
             let order = if listener.knows_rgbx { ByteOrder::Rgbx } else { ByteOrder::Bgrx };
-            Ok((queue, Globals { handle, shm, presentation, order, stretch }))
+            Ok((queue, (Globals { handle, shm, presentation, order, stretch }, cell)))
         });
     match found {
-        Ok((queue, globals)) => {
-            tell.send(Ok(globals)).ok()?;
+        Ok((queue, found)) => {
+            tell.send(Ok(found)).ok()?;
             Some((queue, listener))
         }
         Err(error) => {

@@ -1,0 +1,46 @@
+//! What is behind the streams that share a window: black, as large as the window.
+//!
+//! A window is shown once its own surface has a picture, and the surfaces inside it with it. This
+//! one never changes but with the window's size.
+
+use std::sync::Arc;
+
+use foreframe_engine::{ColorPlane, MonoTime, StreamFormat};
+use winit::dpi::PhysicalSize;
+use winit::event_loop::OwnedDisplayHandle;
+use winit::window::Window as DesktopWindow;
+
+use super::cell::Role;
+use super::guest::Guest;
+use super::surface::WaylandSurface;
+use crate::sink::window::WindowError;
+use crate::sink::window::shared::{Column, Shared};
+
+/// The black of one window.
+pub(in crate::sink::window) struct Backdrop {
+    surface: WaylandSurface,
+    shared: Arc<Shared>,
+    black: ColorPlane,
+}
+
+impl Backdrop {
+    /// For a window that is on Wayland.
+    pub(in crate::sink::window) fn new(
+        window: &Arc<DesktopWindow>,
+        display: &OwnedDisplayHandle,
+    ) -> Result<Self, WindowError> {
+        let guest = Guest::join(window, display).ok_or(WindowError::Lacks("Wayland"))?;
+        // Nobody waits for what happens to it.
+        let shared = Arc::new(Shared::new(|| {}));
+        let format = StreamFormat::rgba8(1, 1);
+        let surface = WaylandSurface::new(guest, &format, Arc::clone(&shared), Role::Whole)?;
+        Ok(Self { surface, shared, black: ColorPlane::new(format.color, 1, 1) })
+    }
+
+    /// Fills a window of this size; false where it cannot.
+    pub(in crate::sink::window) fn fill(&mut self, size: PhysicalSize<u32>, scale: f64) -> bool {
+        self.shared.set_place(size, scale, Column::WHOLE);
+        drop(self.shared.take_events());
+        self.surface.present(MonoTime::ZERO, &self.black)
+    }
+}
