@@ -15,7 +15,7 @@ use crate::params::format_code;
 
 /// How long a device may take to answer. Far more than a slow software adapter needs for a large
 /// picture; without it a hung device would hang its stream.
-const TIMEOUT: Duration = Duration::from_secs(20);
+pub(super) const TIMEOUT: Duration = Duration::from_secs(20);
 /// How long a device that has failed may take to say that it is lost.
 const LAST_WORDS: Duration = Duration::from_secs(1);
 

@@ -3,33 +3,53 @@
 //! [`Upload`] is filled by the CPU and copied on the device; it is mapped again as soon as that is
 //! done, so that the next key finds it ready. [`Download`] goes the other way.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
 
 use super::GpuError;
-use super::device::Gpu;
+use super::device::{Gpu, TIMEOUT};
 
 /// How far a mapping is.
+///
+/// Whichever thread polls the device runs the callbacks of all. So where several streams share a
+/// device, the word may come a moment after the device is known to be done, and is waited for.
 #[derive(Clone, Debug, Default)]
-struct Mapping(Arc<AtomicU8>);
+struct Mapping(Arc<(Mutex<Reached>, Condvar)>);
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+enum Reached {
+    #[default]
+    Pending,
+    Ready,
+    Failed,
+}
 
 impl Mapping {
-    const PENDING: u8 = 0;
-    const READY: u8 = 1;
-    const FAILED: u8 = 2;
-
     /// Asks for `buffer` to be mapped once the device is done with it.
     fn ask(&self, buffer: &wgpu::Buffer, mode: wgpu::MapMode) {
-        self.0.store(Self::PENDING, Ordering::Release);
-        let state = Arc::clone(&self.0);
+        self.reach(Reached::Pending);
+        let mapping = self.clone();
         buffer.map_async(mode, .., move |result| {
-            let reached = if result.is_ok() { Self::READY } else { Self::FAILED };
-            state.store(reached, Ordering::Release);
+            mapping.reach(if result.is_ok() { Reached::Ready } else { Reached::Failed });
         });
     }
 
+    fn reach(&self, reached: Reached) {
+        let (state, changed) = &*self.0;
+        *state.lock().unwrap_or_else(PoisonError::into_inner) = reached;
+        changed.notify_all();
+    }
+
     fn is_ready(&self) -> bool {
-        self.0.load(Ordering::Acquire) == Self::READY
+        *self.0.0.lock().unwrap_or_else(PoisonError::into_inner) == Reached::Ready
+    }
+
+    /// Whether it is mapped, once that is known: the device is done.
+    fn is_ready_at_last(&self) -> bool {
+        let (state, changed) = &*self.0;
+        let state = state.lock().unwrap_or_else(PoisonError::into_inner);
+        let waited =
+            changed.wait_timeout_while(state, TIMEOUT, |reached| *reached == Reached::Pending);
+        *waited.unwrap_or_else(PoisonError::into_inner).0 == Reached::Ready
     }
 }
 
@@ -55,12 +75,14 @@ impl Upload {
         let size = bytes.len() as u64;
         let staging = match self.staging.take().filter(|staging| staging.size() >= size) {
             Some(staging) => {
-                if let Some(last) = self.last.take()
-                    && !self.mapping.is_ready()
-                {
-                    gpu.wait(last)?;
-                }
-                if !self.mapping.is_ready() {
+                let is_ready = match self.last.take() {
+                    Some(last) if !self.mapping.is_ready() => {
+                        gpu.wait(last)?;
+                        self.mapping.is_ready_at_last()
+                    }
+                    _ => self.mapping.is_ready(),
+                };
+                if !is_ready {
                     return Err(GpuError::Refused { why: "no memory for an upload".to_owned() });
                 }
                 staging
@@ -128,7 +150,7 @@ impl Download {
         let staging = self.staging.as_ref().ok_or(GpuError::ReadBack)?;
         self.mapping.ask(staging, wgpu::MapMode::Read);
         gpu.wait(submission)?;
-        if !self.mapping.is_ready() {
+        if !self.mapping.is_ready_at_last() {
             return Err(GpuError::ReadBack);
         }
         let bytes = staging.get_mapped_range(..).map_err(|_| GpuError::ReadBack)?;

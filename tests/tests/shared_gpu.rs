@@ -1,0 +1,73 @@
+//! Several streams on one GPU adapter: each has its share of it. Counts alone are compared, not
+//! times: how many pictures one stream gets while another gets so many.
+
+mod rendered;
+
+use std::num::NonZeroUsize;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::{Arc, Barrier};
+use std::thread;
+
+use foreframe_engine::backend::gpu::Gpu;
+use foreframe_engine::backend::gpu::test_adapters::test_gpus;
+use foreframe_engine::{ColorPlane, Engine, EngineConfig, Method, MonoTime};
+use foreframe_fixtures::{SCENES, Size};
+use rendered::{INTERVAL, Rendered};
+
+const SMALL: Size = Size { width: 96, height: 54 };
+const LARGE: Size = Size { width: 640, height: 360 };
+
+/// How many pictures each of two streams gets until the second has `enough`.
+fn pictures(gpu: &Arc<Gpu>, sizes: [Size; 2], enough: u32) -> [u32; 2] {
+    let counts = [0, 0].map(AtomicU32::new);
+    let is_over = AtomicBool::new(false);
+    let start = Barrier::new(2);
+    thread::scope(|scope| {
+        for (index, size) in sizes.into_iter().enumerate() {
+            let (counts, is_over, start) = (&counts, &is_over, &start);
+            scope.spawn(move || {
+                let rendered = Rendered::new(&SCENES[0], size, [2.0; 2], 2);
+                let config = EngineConfig::new(Method::Linear, NonZeroUsize::MIN);
+                let mut engine = Engine::new(rendered.format, config);
+                engine.use_gpu(gpu);
+                for key in 0..2 {
+                    let content_time = MonoTime::ZERO + INTERVAL.scale(key + 1, 1);
+                    rendered.with_input(key as usize, content_time, |input| {
+                        engine.push_key(input).expect("the key is as declared");
+                    });
+                }
+                let mut picture = ColorPlane::default();
+                start.wait();
+                let mut phase = 0;
+                while !is_over.load(Ordering::Relaxed) {
+                    phase = phase % 60 + 1;
+                    let shown_at = MonoTime::ZERO + INTERVAL.scale(120 + phase, 60);
+                    engine.synthesise(shown_at, &mut picture).expect("a key was taken in");
+                    let count = counts[index].fetch_add(1, Ordering::Relaxed) + 1;
+                    if index == 1 && count == enough {
+                        is_over.store(true, Ordering::Relaxed);
+                    }
+                }
+                assert_eq!(engine.backend().fell_back, None);
+                assert_eq!(engine.backend().name, format!("gpu:{}", gpu.name()));
+            });
+        }
+    });
+    counts.map(AtomicU32::into_inner)
+}
+
+#[test]
+fn equal_streams_on_one_adapter_get_about_as_many_pictures() {
+    for gpu in test_gpus("equal_streams_on_one_adapter_get_about_as_many_pictures") {
+        let [first, second] = pictures(&gpu, [SMALL; 2], 90);
+        assert!((30..=270).contains(&first), "{first} beside {second} on {}", gpu.name());
+    }
+}
+
+#[test]
+fn a_large_stream_leaves_a_small_one_at_least_as_many_pictures_as_it_gets() {
+    for gpu in test_gpus("a_large_stream_leaves_a_small_one_at_least_as_many_pictures_as_it_gets") {
+        let [small, large] = pictures(&gpu, [SMALL, LARGE], 40);
+        assert!(small >= large, "{small} beside {large} on {}", gpu.name());
+    }
+}
