@@ -277,6 +277,8 @@ fn another_mode_is_followed_and_the_application_hears_of_it() {
     }
     stage.show_until(|shown, _| shown.len() > 20);
     stage.strike();
+    // From what is announced, not because the former rate turned out to be wrong.
+    assert!(!stage.log().contains("rate is measured"), "{}", stage.log());
 }
 
 #[test]
