@@ -3,15 +3,18 @@
 //! Usage: `cargo run --release -p foreframe-engine --example time_finish [-- THREADS]`
 //!
 //! Pictures of 1024x1024 rgba8: flat patches with texture on them, and noise, which is the worst
-//! there is for tables. Three frames share the light of a key. The gate is all in the tables: with
+//! there is for tables. Three frames share the light of a key, of which all is blurred, or what is
+//! selected where a twentieth of the picture moves over the rest. The gate is all in the tables: with
 //! it the same kernels run, and what it costs is making the tables of a stream, once.
 
 use std::num::NonZeroUsize;
 use std::time::Instant;
 
 use foreframe_engine::color::Rgba8;
+use foreframe_engine::field::FieldMap;
 use foreframe_engine::finish::{Finish, FinishConfig, FinishMode, Part};
-use foreframe_engine::{ColorPlane, MonoSpan, Plane, Rect, StreamFormat};
+use foreframe_engine::key::{KeyFrame, Velocity};
+use foreframe_engine::{ColorPlane, MonoSpan, Phase, Plane, Rect, StreamFormat};
 use foreframe_perception::display::DisplayProfile;
 
 const SIZE: u32 = 1024;
@@ -38,6 +41,21 @@ fn picture(is_noise: bool) -> ColorPlane {
     };
     let pixels = (0..SIZE * SIZE).map(|i| pixel(i % SIZE, i / SIZE)).collect();
     ColorPlane::Rgba8(Plane::from_vec(SIZE, SIZE, pixels))
+}
+
+/// A key of `picture` in which a patch of 230x230 pixels moves by 12, with a field of half its size.
+fn patch(picture: &ColorPlane) -> (KeyFrame, FieldMap) {
+    let cells = SIZE / 2;
+    let inside = |cell: u32| (200..315).contains(&cell);
+    let velocity = (0..cells * cells).map(|i| match (inside(i % cells), inside(i / cells)) {
+        (true, true) => Velocity { x: 12 * 32, y: 0 },
+        _ => Velocity::default(),
+    });
+    let valid = Rect::full(SIZE, SIZE);
+    let velocity = Plane::from_vec(cells, cells, velocity.collect());
+    let mut map = FieldMap::default();
+    map.update(valid, [cells; 2], [0; 2]);
+    (KeyFrame { color: picture.clone(), valid, velocity, ..KeyFrame::default() }, map)
 }
 
 fn median(mut times: Vec<f64>) -> [f64; 2] {
@@ -67,11 +85,28 @@ fn main() {
         }
         let [middle, least] = median(first);
         println!("{mode:5} tables, once per stream  {middle:6.3} {least:6.3}");
-        for (name, is_noise) in [("texture", false), ("noise", true)] {
+        for (name, is_noise, is_whole) in [
+            ("texture", false, true),
+            ("noise", true, true),
+            ("texture, selected", false, false),
+            ("noise, selected", true, false),
+        ] {
             let original = picture(is_noise);
+            let config = config.whole(is_whole);
             let mut finish = Finish::new(&format, &config, Some(56.0)).expect("it is not off");
+            let (key, map) = patch(&original);
+            let mut times = Vec::new();
+            for _ in 0..ROUNDS {
+                times.push(timed(|| {
+                    pool.install(|| finish.take_key(&pool, &key, None, &map, None));
+                }));
+            }
+            if !is_whole {
+                let [middle, least] = median(times);
+                println!("{mode:5} {name:17} selection  {middle:6.3} {least:6.3}");
+            }
             let mut out = original.clone();
-            let mut mean = 0.0;
+            let mut mean = [0.0; 2];
             for (part, share) in
                 [(Part::Key { frames: 3 }, 1.0), (Part::InBetween { frames: 3 }, 2.0)]
             {
@@ -79,14 +114,19 @@ fn main() {
                 for _ in 0..ROUNDS {
                     out.copy_from(&original);
                     times.push(timed(|| {
-                        pool.install(|| finish.apply(&pool, part, valid, &mut out));
+                        pool.install(|| {
+                            finish.turn_to(Phase::from_f64(0.33), 0);
+                            finish.apply(&pool, part, valid, &mut out);
+                        });
                     }));
                 }
-                let [middle, least] = median(times);
-                mean += share * middle / 3.0;
-                println!("{mode:5} {name:8} {part:?}  {middle:6.3} {least:6.3}");
+                let times = median(times);
+                mean = [0, 1].map(|i| mean[i] + share * times[i] / 3.0);
+                let [middle, least] = times;
+                println!("{mode:5} {name:17} {part:?}  {middle:6.3} {least:6.3}");
             }
-            println!("{mode:5} {name:8} mean of three frames  {mean:6.3}");
+            let [middle, least] = mean;
+            println!("{mode:5} {name:17} mean of three frames  {middle:6.3} {least:6.3}");
         }
     }
 }

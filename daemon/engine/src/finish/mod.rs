@@ -74,7 +74,7 @@ impl Finish {
     }
 
     /// A key has come, `older` before it; its field lies as `map` says, if it has one.
-    pub(crate) fn take_key(
+    pub fn take_key(
         &mut self,
         pool: &ThreadPool,
         key: &KeyFrame,
@@ -101,7 +101,7 @@ impl Finish {
     }
 
     /// Makes the selection that of `phase` after the newest key, by the key `age` before it.
-    pub(crate) fn turn_to(&mut self, phase: Phase, age: u8) {
+    pub fn turn_to(&mut self, phase: Phase, age: u8) {
         if let Some(selection) = &mut self.selection {
             selection.turn_to(phase, age);
         }
@@ -121,7 +121,7 @@ impl Finish {
         }
         let Some(split) = self.shares.of(part) else { return };
         let split = Split { weights, ..split };
-        pyramid::pyramid(pool, picture, valid, &mut self.pyramid);
+        pyramid::pyramid(pool, picture, valid, weights, &mut self.pyramid);
         compensate::compensate(pool, &split, valid, &self.pyramid, picture);
     }
 }

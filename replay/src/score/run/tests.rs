@@ -1,5 +1,7 @@
 //! The protocol on recordings of which everything is known.
 
+mod retina;
+
 use super::*;
 use crate::recording::memory::MemoryRecording;
 use crate::score::metrics::{psnr_rgb_db, psnr_y_db};

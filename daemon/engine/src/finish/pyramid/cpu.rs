@@ -8,10 +8,18 @@ use super::Pyramid;
 use crate::bands::for_each_row;
 use crate::color::ColorPlane;
 use crate::finish::lanes::{Lanes, Wide};
+use crate::finish::selection::TILE;
 use crate::plane::{Plane, Rect};
 
-/// (1), (2) and (4) of the part `valid` of `picture`.
-pub fn pyramid(pool: &ThreadPool, picture: &ColorPlane, valid: Rect, levels: &mut Pyramid) {
+/// (1), (2) and (4) of the part `valid` of `picture`, as far as what is blurred by these `weights`
+/// of tiles reads them; all of them without. What nothing reads keeps what was there.
+pub fn pyramid(
+    pool: &ThreadPool,
+    picture: &ColorPlane,
+    valid: Rect,
+    weights: Option<&Plane<u8>>,
+    levels: &mut Pyramid,
+) {
     let format = picture.format();
     let half = [valid.width, valid.height].map(|side| side.div_ceil(2));
     let quarter = half.map(|side| side.div_ceil(2));
@@ -19,25 +27,26 @@ pub fn pyramid(pool: &ThreadPool, picture: &ColorPlane, valid: Rect, levels: &mu
     levels.quarter.reset(format, quarter[0], quarter[1]);
     levels.smooth.reset(format, half[0], half[1]);
     let Pyramid { half, quarter, smooth } = levels;
+    let read = &Read::new(weights);
     match (picture, half, quarter, smooth) {
         (
             ColorPlane::Rgba8(picture),
             ColorPlane::Rgba8(half),
             ColorPlane::Rgba8(quarter),
             ColorPlane::Rgba8(smooth),
-        ) => build(pool, picture, valid, [half, quarter, smooth]),
+        ) => build(pool, picture, valid, read, [half, quarter, smooth]),
         (
             ColorPlane::Rgb10a2(picture),
             ColorPlane::Rgb10a2(half),
             ColorPlane::Rgb10a2(quarter),
             ColorPlane::Rgb10a2(smooth),
-        ) => build(pool, picture, valid, [half, quarter, smooth]),
+        ) => build(pool, picture, valid, read, [half, quarter, smooth]),
         (
             ColorPlane::Rgba16f(picture),
             ColorPlane::Rgba16f(half),
             ColorPlane::Rgba16f(quarter),
             ColorPlane::Rgba16f(smooth),
-        ) => build(pool, picture, valid, [half, quarter, smooth]),
+        ) => build(pool, picture, valid, read, [half, quarter, smooth]),
         _ => unreachable!("every level has just been given the format of the picture"),
     }
 }
@@ -46,16 +55,21 @@ fn build<T: Wide>(
     pool: &ThreadPool,
     picture: &Plane<T>,
     valid: Rect,
+    read: &Read,
     [half, quarter, smooth]: [&mut Plane<T>; 3],
 ) {
-    down(pool, picture, valid, half);
-    down(pool, half, Rect::full(half.width(), half.height()), quarter);
+    down(pool, picture, valid, |y| read.is_near(2 * y), half);
+    let whole = Rect::full(half.width(), half.height());
+    down(pool, half, whole, |y| read.is_near(4 * y), quarter);
     let quarter = &*quarter;
     for_each_row(
         pool,
         smooth,
         #[inline(always)]
         |y, row| {
+            if !read.is_near(2 * y) {
+                return;
+            }
             up_row(
                 quarter,
                 y,
@@ -66,14 +80,49 @@ fn build<T: Wide>(
     );
 }
 
-/// (1) of the part `valid` of `fine`.
-fn down<T: Wide>(pool: &ThreadPool, fine: &Plane<T>, valid: Rect, coarse: &mut Plane<T>) {
+/// Which rows of tiles are blurred anywhere; None where all are.
+struct Read(Option<Vec<bool>>);
+
+impl Read {
+    /// Rows of tiles above and below a blurred one whose pixels it reads or gives a weight to: one
+    /// of weights, and 16 pixels of three levels.
+    const REACH: usize = 3;
+
+    fn new(weights: Option<&Plane<u8>>) -> Self {
+        Self(weights.map(|weights| {
+            let rows = 0..weights.height();
+            let is_blurred = |y: u32| weights.row(y).iter().any(|weight| *weight > 0);
+            rows.map(is_blurred).collect()
+        }))
+    }
+
+    /// Whether a level's row that lies on row `y` of the picture is read.
+    #[inline(always)]
+    fn is_near(&self, y: u32) -> bool {
+        let Some(rows) = &self.0 else { return true };
+        let row = (y / TILE) as usize;
+        let end = (row + Self::REACH + 1).min(rows.len());
+        rows[row.saturating_sub(Self::REACH).min(end)..end].contains(&true)
+    }
+}
+
+/// (1) of the part `valid` of `fine`, of the rows that are read.
+fn down<T: Wide>(
+    pool: &ThreadPool,
+    fine: &Plane<T>,
+    valid: Rect,
+    is_read: impl Fn(u32) -> bool + Sync,
+    coarse: &mut Plane<T>,
+) {
     let (left, width) = (valid.x as usize, valid.width as usize);
     for_each_row(
         pool,
         coarse,
         #[inline(always)]
         |y, row| {
+            if !is_read(y) {
+                return;
+            }
             let line = |y: u32| &fine.row(valid.y + y)[left..left + width];
             let middle = 2 * y;
             let (above, here) = (line(middle.saturating_sub(1)), line(middle));

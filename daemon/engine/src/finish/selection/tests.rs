@@ -125,7 +125,7 @@ proptest! {
         (width, height) in (1_u32..40, 1_u32..40),
         seed: u32,
     ) {
-        let weight = |x, y| (hash(x, y, seed) % 129) as u8 * u8::from(hash(y, x, seed) % 3 > 0);
+        let weight = |x, y| (hash(x, y, seed) % 129) as u8 * u8::from(!hash(y, x, seed).is_multiple_of(3));
         let weights = plane(width.div_ceil(TILE), height.div_ceil(TILE), weight);
         let (mut columns, mut row) = (Vec::new(), vec![77; width as usize]);
         for y in 0..height {
