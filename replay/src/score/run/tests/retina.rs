@@ -52,9 +52,12 @@ fn on_the_retina_frames_in_between_are_closer_to_the_truth_than_keys_alone_and_h
                 assert!(made.psnr_rgb_db > made.keys_psnr_rgb_db, "{scene}, {finish}: {made:?}");
                 assert!(made.ssim > made.keys_ssim, "{scene}, {finish}: {made:?}");
             }
-            // Negative control: 120 pictures a second are not enough, they have to move.
-            assert!(hold.psnr_rgb_db < hold.keys_psnr_rgb_db, "{scene}, {finish}: {hold:?}");
-            assert!(hold.ssim < hold.keys_ssim, "{scene}, {finish}: {hold:?}");
+            // Negative control: 120 pictures a second are not enough, they have to move. Finishing
+            // sharpens even held ones, as it shows detail for one refresh of three.
+            if finish == FinishMode::Off {
+                assert!(hold.psnr_rgb_db < hold.keys_psnr_rgb_db, "{scene}: {hold:?}");
+                assert!(hold.ssim < hold.keys_ssim, "{scene}: {hold:?}");
+            }
         }
     }
 }
