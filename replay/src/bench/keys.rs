@@ -8,8 +8,11 @@ use foreframed::ingest;
 
 use crate::recording::{Frame, OwnedPlane};
 
-/// Rendered keys; the bench shows them over and over, under new times.
-const KEYS: u32 = 4;
+/// Keys of a sequence at most, and at least; between them as many as fit into [`BUDGET`].
+const MOST_KEYS: usize = 16;
+const LEAST_KEYS: usize = 8;
+/// Bytes of the planes of a sequence.
+const BUDGET: usize = 256 << 20;
 /// Time from key to key: 40 Hz.
 pub(super) const KEY_INTERVAL_S: f64 = 0.025;
 
@@ -18,7 +21,8 @@ pub(super) const KEY_INTERVAL_S: f64 = 0.025;
 pub(super) struct RenderedKeys {
     /// What the stream declares.
     pub(super) format: StreamFormat,
-    /// The keys, their times still to be filled in.
+    /// The keys in a row, their times still to be filled in. The first is a cut: the sequence is
+    /// shown over and over, and its end does not lead to its beginning.
     pub(super) keys: Vec<Frame>,
 }
 
@@ -52,7 +56,11 @@ impl RenderedKeys {
         let recipe =
             Recipe { depth_ratio: field_ratio, motion_ratio: field_ratio, ..Recipe::new(size) };
         let message = stream_options(&recipe, CLIENT_MOTION).to_message(1);
-        let keys = (1..=KEYS).map(|index| {
+        let pixels = size.width as usize * size.height as usize;
+        let cells = (pixels as f64 / (field_ratio * field_ratio)) as usize;
+        let key_bytes = 4 * pixels + 8 * cells;
+        let count = (BUDGET / key_bytes).clamp(LEAST_KEYS, MOST_KEYS) as u32;
+        let keys = (1..=count).map(|index| {
             let time = f64::from(index) * KEY_INTERVAL_S;
             let key = RenderedKey::render(&renderer, &recipe, time, time - KEY_INTERVAL_S);
             let (depth, motion) = (key.depth_bytes(), key.motion_bytes(CLIENT_MOTION));
@@ -60,7 +68,7 @@ impl RenderedKeys {
                 index: u64::from(index),
                 content_time: MonoTime::from_ns(0),
                 motion_from: None,
-                is_cut: false,
+                is_cut: index == 1,
                 color: plane(key.color.rgba, size, 4),
                 depth: Some(plane(depth, key.depth_size, 4)),
                 motion: Some(plane(motion, key.motion_size, CLIENT_MOTION.bytes_per_pixel())),

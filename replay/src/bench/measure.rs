@@ -9,11 +9,12 @@ use super::keys::{KEY_INTERVAL_S, RenderedKeys};
 use super::{Backend, Settings};
 
 /// Keys that are run before the first of a round that counts: buffers get their sizes, clocks
-/// their speed, and caches what a stream leaves in them.
-const WARM_UP: usize = 3;
-/// Keys of a round. After each come as many plain copies: in turn, as machines change their speed,
-/// but not in between, as a copy empties the caches that a stream finds full.
-const ROUND: usize = 12;
+/// their speed, caches what a stream leaves in them, and methods the history that they need.
+///
+/// A round is the rest of the sequence of keys. After it come as many plain copies: in turn, as
+/// machines change their speed, but not in between, as a copy empties the caches that a stream
+/// finds full.
+const WARM_UP: usize = 4;
 
 /// Times of one case, one entry per key or frame.
 #[derive(Clone, PartialEq, Debug, Default)]
@@ -55,9 +56,9 @@ pub(super) fn time_case(
     // A method that interpolates has work between the keys before, and none after the newest.
     let behind = if method.interpolates() { interval } else { MonoSpan::ZERO };
     let mut index = 0;
-    let mut take_key = || -> anyhow::Result<Vec<MonoTime>> {
+    let mut take_key = |place: usize| -> anyhow::Result<Vec<MonoTime>> {
         let content_time = MonoTime::from_ns(1_000_000_000) + interval.scale(index as i64, 1);
-        let mut input = rendered.keys[index % rendered.keys.len()].as_input();
+        let mut input = rendered.keys[place].as_input();
         input.index = index as u64;
         input.content_time = content_time;
         input.motion_from = Some(content_time - interval);
@@ -75,12 +76,12 @@ pub(super) fn time_case(
     };
     let mut left = settings.keys.get();
     while left > 0 {
-        for _ in 0..WARM_UP {
-            take_key()?;
+        for place in 0..WARM_UP {
+            take_key(place)?;
         }
-        let round = left.min(ROUND);
-        for _ in 0..round {
-            times.add_key(&take_key()?);
+        let round = left.min(rendered.keys.len() - WARM_UP);
+        for place in WARM_UP..WARM_UP + round {
+            times.add_key(&take_key(place)?);
         }
         for _ in 0..round {
             let starts_at = clock::now();
