@@ -263,6 +263,18 @@ impl Evidence {
         choose::share(pool, leads, shared);
     }
 
+    /// Nothing moves in the newest key, which says nothing of how things move: it is held, and all
+    /// that is known stays. Returns false where nothing is known of a field with these `points`.
+    pub fn rest(&mut self, points: [u32; 2]) -> bool {
+        if [self.samples.width(), self.samples.height()] != points {
+            return false;
+        }
+        self.trust.clear();
+        self.leads.data_mut().fill(Lead::by(Rung::Hold));
+        self.shared.data_mut().fill(index_of(Rung::Hold) as u8);
+        true
+    }
+
     /// Whether luma has shown that the newest key is a cut that nobody declared.
     #[must_use]
     pub fn is_cut(&self) -> bool {

@@ -249,7 +249,11 @@ impl Ladder {
             if let Some((flow, older)) = flow.zip(followed).filter(|_| is_evidence) {
                 flow.find_failed(pool, key, older, &mut models.failed);
             }
-            self.weigh(pool, key, &models, followed, before);
+            let points = models.lattice.points();
+            let rests = is_evidence && self.late.is_none() && is_at_rest(key, &models);
+            if !rests || !self.evidence.rest(points) {
+                self.weigh(pool, key, &models, followed, before);
+            }
         }
         if self.evidence.is_cut() {
             // The next key knows two poses of this place, and no more.
@@ -338,7 +342,7 @@ impl Ladder {
         let uses_global = match self.choice {
             Choice::Always(rung) => rung == Rung::Global,
             Choice::World => false,
-            Choice::Evidence => self.evidence.asks_for_global(),
+            Choice::Evidence => self.evidence.asks_for_global() && !is_still(key),
         };
         models.global = if uses_global { Homography::fit(key, &models.grid) } else { None };
         if !matches!(self.choice, Choice::Always(_)) {
@@ -396,10 +400,9 @@ impl Ladder {
         };
         let is_always = !matches!(self.choice, Choice::Evidence);
         let is_decoded = key.velocity.data().len() == key.displacement.data().len();
-        let is_still = || key.velocity.data().iter().all(|v| *v == Velocity::default());
         // Held, or gone by a motion of zero: the same.
         let is_own = one_for_all == Some(Rung::Linear)
-            || (one_for_all == Some(Rung::Hold) && is_decoded && is_still());
+            || (one_for_all == Some(Rung::Hold) && is_decoded && is_still(key));
         if is_own && is_decoded {
             // The field as it was decoded.
             key.acceleration.resize(0, 0);
@@ -446,6 +449,17 @@ impl Ladder {
         let seconds = key.motion_span()?.as_secs_f64() as f32;
         self.pixels_per_degree.map(|pixels_per_degree| pixels_per_degree * seconds)
     }
+}
+
+/// Whether neither the motion of `key` nor its picture says that anything moves.
+fn is_at_rest(key: &KeyFrame, models: &Models) -> bool {
+    let is_decoded = key.velocity.data().len() == key.displacement.data().len();
+    is_decoded && models.failed.is_empty() && is_still(key)
+}
+
+/// Whether the motion of `key` is zero everywhere.
+fn is_still(key: &KeyFrame) -> bool {
+    key.velocity.data().iter().all(|velocity| *velocity == Velocity::default())
 }
 
 /// Fills in a row, sample by sample: runs of samples that share a rung, and cells of others, which

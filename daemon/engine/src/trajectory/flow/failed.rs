@@ -1,9 +1,10 @@
 //! Where a key's own motion does not explain its picture, and flow does.
 //!
 //! A block of the key is looked at by the motion of the cells at its centre and near its corners
-//! first: most are explained by one of them. What is not is looked at pixel by pixel
-//! ([`super::own`]), by the motion of each and but for those that were hidden before, as outlines
-//! may run through it:
+//! first: most are explained by one of them. What is not is doubted. Where a block near it was doubted
+//! in the key before, it is looked at pixel by pixel ([`super::own`]), by the motion of each and but
+//! for those that were hidden before, as outlines may run through it. A picture that is another all
+//! of a sudden, as at a cut, so costs no search:
 //!
 //! ```text
 //! (5) failed    where SAD(D) > NOISE + contrast / 4
@@ -26,7 +27,10 @@ use super::subpixel::{error_of, refine};
 use super::{BLOCK, PER_PX, Step};
 use crate::bands::for_each_chunk;
 use crate::plane::{Plane, Rect};
+use crate::time::MonoTime;
 
+/// How far, in blocks, what is doubted goes from key to key.
+const NEAR: u32 = 2;
 /// Of a block that its key's motion explains, or nothing does.
 const NONE: Step = [i16::MIN; 2];
 
@@ -73,6 +77,11 @@ impl FailedField {
 /// Buffers of the search for them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Failing {
+    /// The blocks that are doubted, and those of the key before.
+    doubted: Plane<bool>,
+    doubted_before: Plane<bool>,
+    /// Of which key `doubted` is.
+    doubted_of: Option<MonoTime>,
     /// The blocks of each level that are searched, the finest first.
     wanted: Vec<Plane<bool>>,
     /// What (6) leaves.
@@ -85,13 +94,39 @@ impl Failing {
         &self.wanted
     }
 
-    /// Marks the blocks that have failed (5); false if none has.
-    pub(super) fn mark(&mut self, pool: &ThreadPool, own: &Own<'_>, levels: [&Level; 2]) -> bool {
+    /// Marks the blocks that have failed (5) in the key of content time `times[0]`, whose `own`
+    /// motion points back to `times[1]`; false if none has.
+    pub(super) fn mark(
+        &mut self,
+        pool: &ThreadPool,
+        own: &Own<'_>,
+        levels: [&Level; 2],
+        times: [MonoTime; 2],
+    ) -> bool {
         if self.wanted.is_empty() {
             self.wanted.push(Plane::default());
         }
-        let marks = &mut self.wanted[0];
         let [columns, rows] = levels[0].blocks();
+        std::mem::swap(&mut self.doubted, &mut self.doubted_before);
+        let knows_before = self.doubted_of.replace(times[0]) == Some(times[1])
+            && [self.doubted_before.width(), self.doubted_before.height()] == [columns, rows];
+        self.doubted.resize(columns, rows);
+        for_each_chunk(
+            pool,
+            self.doubted.data_mut(),
+            columns as usize,
+            #[inline(always)]
+            |y, row| {
+                for (x, mark) in (0..).zip(row) {
+                    *mark = is_doubted(own, levels, [x, y]);
+                }
+            },
+        );
+        if !knows_before {
+            return false;
+        }
+        let (doubted, before) = (&self.doubted, &self.doubted_before);
+        let marks = &mut self.wanted[0];
         marks.resize(columns, rows);
         for_each_chunk(
             pool,
@@ -100,7 +135,10 @@ impl Failing {
             #[inline(always)]
             |y, row| {
                 for (x, mark) in (0..).zip(row) {
-                    *mark = has_failed(own, levels, [x, y]);
+                    let block = [x, y];
+                    *mark = doubted.at(x, y)
+                        && is_near(before, block)
+                        && has_failed(own, levels, block);
                 }
             },
         );
@@ -198,9 +236,24 @@ fn has_company(explained: &Plane<Step>, [x, y]: [u32; 2]) -> bool {
     count > 2
 }
 
-/// (5).
+/// Whether a marked block lies around `block`.
 #[inline(always)]
-fn has_failed(own: &Own<'_>, [now, then]: [&Level; 2], block: [u32; 2]) -> bool {
+fn is_near(marks: &Plane<bool>, [x, y]: [u32; 2]) -> bool {
+    let last = [marks.width() - 1, marks.height() - 1];
+    let columns = x.saturating_sub(NEAR) as usize..=(x + NEAR).min(last[0]) as usize;
+    let mut rows = y.saturating_sub(NEAR)..=(y + NEAR).min(last[1]);
+    rows.any(|y| marks.row(y)[columns.clone()].contains(&true))
+}
+
+/// (5), pixel by pixel.
+fn has_failed(own: &Own<'_>, levels: [&Level; 2], block: [u32; 2]) -> bool {
+    let at = start(levels[0], block);
+    own.seen(levels, at).error > NOISE + contrast(levels[0], at) / 4
+}
+
+/// (5) by the motion of a few cells, to whole pixels.
+#[inline(always)]
+fn is_doubted(own: &Own<'_>, [now, then]: [&Level; 2], block: [u32; 2]) -> bool {
     let at = start(now, block);
     let from = |d: [i32; 2]| {
         let from = [0, 1].map(|axis| at[axis] - ((d[axis] + 128) >> 8));
@@ -215,9 +268,7 @@ fn has_failed(own: &Own<'_>, [now, then]: [&Level; 2], block: [u32; 2]) -> bool 
     let fails = |from: Option<[i32; 2]>| {
         from.is_some_and(|from| sad_in_any_light(now, at, then, from) > most)
     };
-    fails(centre)
-        && own.near_corners(at).into_iter().all(|d| fails(from(d)))
-        && own.seen([now, then], at).error > most
+    fails(centre) && own.near_corners(at).into_iter().all(|d| fails(from(d)))
 }
 
 fn start(level: &Level, block: [u32; 2]) -> [i32; 2] {

@@ -99,7 +99,8 @@ impl Flow {
         }
         let Self { newest: now, older: then, search, failing, .. } = self;
         let own = Own::new(newest, older);
-        if !failing.mark(pool, &own, [now.finest(), then.finest()]) {
+        let times = [newest.content_time, older.content_time];
+        if !failing.mark(pool, &own, [now.finest(), then.finest()], times) {
             return;
         }
         now.complete(pool);
