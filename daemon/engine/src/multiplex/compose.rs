@@ -2,7 +2,7 @@
 //!
 //! Alpha is that of the picture itself.
 
-use foreframe_perception::compensation::{Compensation, FULL_LIGHT, LightTable};
+use foreframe_perception::compensation::{Compensation, FULL_LIGHT};
 use foreframe_perception::multiplex::motion_weight;
 use rayon::ThreadPool;
 
@@ -89,6 +89,7 @@ impl Light {
         to: &mut Plane<T>,
     ) {
         let tables = self.channels.each_ref().map(Compensation::table);
+        let lights = tables.map(|table| table.words()[0]);
         for_each_row(
             pool,
             to,
@@ -100,12 +101,12 @@ impl Light {
                     }
                     let (mut levels, full, low) =
                         (texel.channels(), full.channels(), low.channels());
-                    for (channel, table) in tables.into_iter().enumerate() {
-                        let rest = rest(table, full[channel], low[channel]);
+                    for (channel, lights) in lights.into_iter().enumerate() {
+                        let light = |level: u16| lights[usize::from(level)];
+                        let rest = rest([full[channel], low[channel]].map(light));
                         if rest != 0 {
-                            let lights = [low[channel], levels[channel]].map(|it| table.light(it));
-                            let light = self.with_rest(lights, rest);
-                            levels[channel] = table.level(light);
+                            let around = [low[channel], levels[channel]].map(light);
+                            levels[channel] = tables[channel].level(self.with_rest(around, rest));
                         }
                     }
                     *texel = T::of_channels(levels);
@@ -126,9 +127,9 @@ impl Light {
     }
 }
 
-/// (3), of [`FULL_LIGHT`].
+/// (3) of the light of a full picture and of what is left of it, of [`FULL_LIGHT`].
 #[inline(always)]
-fn rest(table: &LightTable, full: u16, low: u16) -> i64 {
-    let wanted = 2 * i64::from(table.light(full)) - i64::from(table.light(low));
+fn rest([full, low]: [u32; 2]) -> i64 {
+    let wanted = 2 * i64::from(full) - i64::from(low);
     wanted - wanted.clamp(0, FULL_LIGHT.into())
 }

@@ -276,8 +276,9 @@ fn enlarge<T: Texel + Fraction>(
                     mixed.resize(upper.len(), [0; 4]);
                     for (mixed, (upper, lower)) in mixed.iter_mut().zip(upper.iter().zip(lower)) {
                         for channel in 0..4 {
-                            mixed[channel] = u32::from(upper[channel]) * (256 - part)
+                            let sum = u32::from(upper[channel]) * (256 - part)
                                 + u32::from(lower[channel]) * part;
+                            mixed[channel] = (sum + 128) >> 8;
                         }
                     }
                     for (texel, (left, right, part)) in row.iter_mut().zip(columns) {
@@ -285,9 +286,8 @@ fn enlarge<T: Texel + Fraction>(
                         let mut channels = [0; 4];
                         for channel in 0..4 {
                             let sum = left[channel] * (256 - part) + right[channel] * part;
-                            let half = 1_u64 << (15 + T::BITS);
-                            let level = (u64::from(sum) + half) >> (16 + T::BITS);
-                            channels[channel] = level as u16;
+                            channels[channel] =
+                                ((sum + (1 << (7 + T::BITS))) >> (8 + T::BITS)) as u16;
                         }
                         *texel = T::of_channels(channels);
                     }
