@@ -22,7 +22,8 @@ fn main() -> Result<(), Error> {
         let content_time_ns = clock::monotonic_ns();
         match client.acquire(stream) {
             Ok(mut frame) => {
-                // Whether a key is a reduced one is said by its valid rectangle, and by nothing else.
+                // Whether a key is a reduced one is said by its valid rectangle, and by nothing
+                // else.
                 let divisor = if index.is_multiple_of(2) { 1 } else { 2 };
                 let (width, height) = (WIDTH / divisor, HEIGHT / divisor);
                 frame.set_valid(PlaneKind::Color, Rect::full(width, height))?;

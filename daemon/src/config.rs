@@ -41,8 +41,8 @@ pub struct Args {
     /// Monitor for windows, by its name; one that is not full screen opens there on X11 alone
     #[arg(long, value_name = "NAME")]
     pub monitor: Option<String>,
-    /// Where several streams are shown: single, each in a window of its own, or side-by-side, all in
-    /// one, on Wayland alone [default: single]
+    /// Where several streams are shown: single, each in a window of its own, or side-by-side, all
+    /// in one, on Wayland alone [default: single]
     #[arg(long)]
     #[serde(default, deserialize_with = "from_name")]
     pub layout: Option<Layout>,
@@ -420,8 +420,8 @@ impl Config {
         self.refresh_interval.scale(refreshes, 1)
     }
 
-    /// What is known of the display of a stream that names `profile`: it wins over the daemon's own,
-    /// but not over an angular size that the user said.
+    /// What is known of the display of a stream that names `profile`: it wins over the daemon's
+    /// own, but not over an angular size that the user said.
     ///
     /// # Errors
     /// Which names there are.

@@ -4,8 +4,8 @@
 //!
 //! Pictures of 1024x1024 rgba8: flat patches with texture on them, and noise, which is the worst
 //! there is for tables. Three frames share the light of a key, of which all is blurred, or what is
-//! selected where a twentieth of the picture moves over the rest. The gate is all in the tables: with
-//! it the same kernels run, and what it costs is making the tables of a stream, once.
+//! selected where a twentieth of the picture moves over the rest. The gate is all in the tables:
+//! with it the same kernels run, and what it costs is making the tables of a stream, once.
 
 use std::num::NonZeroUsize;
 use std::time::Instant;
@@ -43,7 +43,8 @@ fn picture(is_noise: bool) -> ColorPlane {
     ColorPlane::Rgba8(Plane::from_vec(SIZE, SIZE, pixels))
 }
 
-/// A key of `picture` in which a patch of 230x230 pixels moves by 12, with a field of half its size.
+/// A key of `picture` in which a patch of 230x230 pixels moves by 12, with a field of half its
+/// size.
 fn patch(picture: &ColorPlane) -> (KeyFrame, FieldMap) {
     let cells = SIZE / 2;
     let inside = |cell: u32| (200..315).contains(&cell);

@@ -2,8 +2,8 @@
 //!
 //! Usage: `cargo run --release -p foreframe-engine --example time_multiplex [-- THREADS]`
 //!
-//! Keys of 1024x1024 rgba8 in turn with keys of half the columns and rows: flat patches with texture
-//! on them, and noise, most of which clips.
+//! Keys of 1024x1024 rgba8 in turn with keys of half the columns and rows: flat patches with
+//! texture on them, and noise, most of which clips.
 
 use std::num::NonZeroUsize;
 use std::time::Instant;

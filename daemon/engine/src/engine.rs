@@ -151,8 +151,8 @@ struct Scratch {
 impl Engine {
     /// An engine for one stream. It starts its threads now, fewer where the system gives fewer.
     ///
-    /// Pictures of a stream that multiplexes are not finished, whatever `config` says: its keys move
-    /// their detail about already.
+    /// Pictures of a stream that multiplexes are not finished, whatever `config` says: its keys
+    /// move their detail about already.
     #[must_use]
     pub fn new(format: StreamFormat, config: EngineConfig) -> Self {
         let multiplex = Multiplex::new(&format, &config.finish);

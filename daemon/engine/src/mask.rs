@@ -40,8 +40,8 @@ pub enum MaskClass {
 pub enum Source {
     /// Its own vector's.
     Vector,
-    /// That of the picture, where it explains the two newest keys, and none where it does not. Where
-    /// the two have too little in common to tell, its own vector's.
+    /// That of the picture, where it explains the two newest keys, and none where it does not.
+    /// Where the two have too little in common to tell, its own vector's.
     Picture,
     /// That of the surface around it, else of the picture, else none: it is held.
     Surroundings,

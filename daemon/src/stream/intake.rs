@@ -1,4 +1,5 @@
-//! Key frames and UI planes out of their slots, into the engine, and a copy of them to the recorder.
+//! Key frames and UI planes out of their slots, into the engine, and a copy of them to the
+//! recorder.
 //!
 //! Without a recorder the engine reads the slot itself, row by row, while it converts. With one the
 //! planes are copied first, and both read the copy.

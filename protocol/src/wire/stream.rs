@@ -70,8 +70,8 @@ wire_struct! {
     }
 }
 
-/// Tag of the extension of [`CreateStream`] that names a display profile. Not critical: a daemon that
-/// does not know it shows the stream as on its own display.
+/// Tag of the extension of [`CreateStream`] that names a display profile. Not critical: a daemon
+/// that does not know it shows the stream as on its own display.
 pub const DISPLAY_PROFILE_TAG: u16 = 1;
 
 /// A new stream.

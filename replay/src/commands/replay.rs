@@ -53,8 +53,8 @@ pub struct Args {
     /// is seen.
     #[arg(long, default_value_t = FinishMode::Off)]
     pub finish: FinishMode,
-    /// With --finish, blur all of an in-between frame: sharper where things move, but not only where
-    /// its motion is not to be relied on.
+    /// With --finish, blur all of an in-between frame: sharper where things move, but not only
+    /// where its motion is not to be relied on.
     #[arg(long)]
     pub finish_whole: bool,
     /// Leave out in-between frames until something has moved by so many pixels, 0 to 16.
@@ -62,8 +62,8 @@ pub struct Args {
     #[arg(allow_negative_numbers = true)]
     pub least_step: f64,
     /// Display that the output is for: a built-in profile (see `perception displays`) or a file
-    /// that ends in .toml. Without --ppd it gives that too, from 65 cm before a screen. It wins over
-    /// the one that the application named [default: that one]
+    /// that ends in .toml. Without --ppd it gives that too, from 65 cm before a screen. It wins
+    /// over the one that the application named [default: that one]
     #[arg(long, value_name = "NAME")]
     pub profile: Option<String>,
     /// Folder of display profiles, files that end in .toml, that the capture may name beside the

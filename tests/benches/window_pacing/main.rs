@@ -1,8 +1,8 @@
 //! The daemon's windows on real compositors: how often a frame is shown when it was planned, how
 //! even the frames are, and how long they take, beside a plain client that draws whenever it is
-//! asked to. Two things are not the daemon's doing, so the plain client runs twice more: once as late
-//! before the refresh as the daemon (late), and once while a daemon makes as many pictures for nobody
-//! on the processors that the compositor draws on (busy).
+//! asked to. Two things are not the daemon's doing, so the plain client runs twice more: once as
+//! late before the refresh as the daemon (late), and once while a daemon makes as many pictures for
+//! nobody on the processors that the compositor draws on (busy).
 //!
 //! `cargo bench -p foreframe-tests --bench window_pacing [-- SECONDS [COMPOSITOR[:HZ]...]]`. The
 //! application runs at 40 keys a second, 640x360, full screen; the first second is not counted.

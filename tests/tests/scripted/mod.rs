@@ -1,7 +1,7 @@
 //! A compositor of our own that does what it is told: the cases that real ones cannot give.
 //!
-//! It knows windows and surfaces inside them, on outputs of its own, and shows what was committed at
-//! each tick of its display, by saying so. It draws nothing, but looks at what it is given
+//! It knows windows and surfaces inside them, on outputs of its own, and shows what was committed
+//! at each tick of its display, by saying so. It draws nothing, but looks at what it is given
 //! ([`Seen`]). A [`Script`] says how it is from the start, and each [`Order`] changes that.
 
 #![allow(dead_code, reason = "each test file uses its own part of the fixture")]

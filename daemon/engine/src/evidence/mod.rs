@@ -50,8 +50,8 @@ use trust::Trust;
 use crate::key::KeyFrame;
 use crate::plane::Plane;
 use crate::trajectory::camera_path::CameraOrder;
-use crate::trajectory::ladder::Models;
 pub use crate::trajectory::lattice::STRIDE;
+use crate::trajectory::models::Models;
 use crate::trajectory::rung::Rung;
 use crate::trajectory::surface::is_same_surface;
 

@@ -17,8 +17,8 @@
 //! the stream or the configuration names. Where the picture is flat nothing changes. How many
 //! frames come between two keys is not known before; [`ledger`] keeps account.
 //!
-//! A picture is blurred only where what was foreseen of it is not to be relied on ([`selection`]), or
-//! all over where [`FinishConfig::is_whole`] says so.
+//! A picture is blurred only where what was foreseen of it is not to be relied on ([`selection`]),
+//! or all over where [`FinishConfig::is_whole`] says so.
 //!
 //! Departures from the paper: (1) gives in-between frames exactly what the key cannot take; the
 //! paper keeps the original where it is darker, and gives back nothing where its grid is distorted,

@@ -41,7 +41,8 @@ pub struct Split<'a> {
     pub is_key: bool,
     /// For as many frames as share the light.
     pub tables: &'a Tables,
-    /// How far each tile is blurred ([`super::selection`]); None where all of the picture is, fully.
+    /// How far each tile is blurred ([`super::selection`]); None where all of the picture is,
+    /// fully.
     pub weights: Option<&'a Plane<u8>>,
 }
 

@@ -7,8 +7,8 @@ use foreframe_perception::tracking::tracked_share;
 
 use super::curve::{Curve, Curves};
 use super::dilate_motion::quantise_row;
-use super::ladder::Models;
 use super::lattice::STRIDE;
+use super::models::Models;
 use super::quadratic::Quadratic;
 use super::rung::Rung;
 use crate::key::{Acceleration, KeyFrame, Velocity};

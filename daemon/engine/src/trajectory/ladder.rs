@@ -1,9 +1,8 @@
 //! One stream's ladder: prepares the rungs for each key and fills in its trajectories.
 //!
-//! [`Models`] holds what the rungs need of one key, small things that are worked out once; a rung's
-//! answer for a cell is then a function of it, the key's planes and the key before. [`Ladder`]
-//! takes the answers of the rung that the method names for every cell, lets each cell take those of
-//! the surface that its colour belongs to (dilation), and leaves them in the key as fixed point.
+//! [`Models`] holds what the rungs need of one key. [`Ladder`] takes the answers of the rung that
+//! the method names for every cell, lets each cell take those of the surface that its colour
+//! belongs to (dilation), and leaves them in the key as fixed point.
 //!
 //! Where a rung has no answer, the motion field itself goes on: [`Rung::Linear`].
 
@@ -11,15 +10,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::ThreadPool;
 
-use super::affine::AffineField;
 use super::camera_path::{CameraOrder, CameraPath, Pose};
-use super::curve::Curve;
 use super::dilate_motion::dilate_cells;
 use super::fill::{Filling, Run};
-use super::flow::{FailedField, Flow};
+use super::flow::Flow;
 use super::global::Homography;
 use super::grid::Grid;
-use super::lattice::{Lattice, STRIDE, middle};
+use super::lattice::{STRIDE, middle};
+use super::models::Models;
 use super::quadratic::Quadratic;
 use super::rung::Rung;
 use super::world::World;
@@ -31,121 +29,8 @@ use crate::method::Method;
 use crate::plane::Plane;
 use crate::time::MonoTime;
 
-/// What the rungs need of one key beside its planes.
-#[derive(Clone, Debug, Default)]
-pub struct Models {
-    grid: Grid,
-    lattice: Lattice,
-    global: Option<Homography>,
-    affine: AffineField,
-    /// By [`CameraOrder`].
-    worlds: [Option<World>; CameraOrder::ALL.len()],
-    /// Where the key's motion does not explain its picture, and what does.
-    failed: FailedField,
-    /// With the camera on its way to a late pose, which takes the place of every order.
-    late: Option<World>,
-}
-
-impl Models {
-    /// The grid of the key's field.
-    #[must_use]
-    pub fn grid(&self) -> &Grid {
-        &self.grid
-    }
-
-    /// The key's field at the lattice's points.
-    #[must_use]
-    pub fn lattice(&self) -> &Lattice {
-        &self.lattice
-    }
-
-    /// Where the key's motion does not explain its picture, and what does.
-    #[must_use]
-    pub fn failed(&self) -> &FailedField {
-        &self.failed
-    }
-
-    /// The flow at a lattice point that the key's motion does not explain.
-    #[must_use]
-    pub fn flow_of(&self, column: u32, row: u32) -> Option<[f32; 2]> {
-        self.failed.at(self.lattice.place(column, row))
-    }
-
-    /// The affine maps that have been fitted.
-    #[must_use]
-    pub fn affine(&self) -> &AffineField {
-        &self.affine
-    }
-
-    /// Fits the runs of eight lattice points that are `wanted`, by number and row.
-    pub fn fit_affine(&mut self, pool: &ThreadPool, wanted: impl Fn(u32, u32) -> bool + Sync) {
-        self.affine.fit(pool, &self.lattice, &self.grid, wanted);
-    }
-
-    /// The model of a camera order: that of the late pose, where there is one.
-    #[must_use]
-    pub fn world(&self, order: CameraOrder) -> Option<&World> {
-        self.late.as_ref().or(self.worlds[order as usize].as_ref())
-    }
-
-    /// Whether a rung was prepared, so that it may have answers.
-    #[must_use]
-    #[inline(always)]
-    pub fn has(&self, rung: Rung) -> bool {
-        rung != Rung::Global || self.global.is_some()
-    }
-
-    /// [`Models::curve`] of a cell for the evidence: affine by one fit and not by the mean of four.
-    #[must_use]
-    #[inline(always)]
-    pub fn curve_of_sample(
-        &self,
-        rung: Rung,
-        key: &KeyFrame,
-        older: Option<&Quadratic<'_>>,
-        x: u32,
-        y: u32,
-    ) -> Option<Curve> {
-        if rung != Rung::Affine {
-            return self.curve(rung, key, older, x, y);
-        }
-        let depth = if key.depth.data().is_empty() { 0 } else { key.depth.at(x, y) };
-        self.affine.curve_by_own(&self.grid, [x, y], depth, key.displacement.at(x, y))
-    }
-
-    /// Whether a late pose says where the surface of a cell goes on to: it moves with the world.
-    #[inline(always)]
-    fn is_led_by_late_camera(&self, key: &KeyFrame, x: u32, y: u32) -> bool {
-        self.late.as_ref().is_some_and(|late| late.is_still(key, &self.grid, x, y))
-    }
-
-    /// Where `rung` takes the surface of a cell; None where it cannot tell. `older` reads the key
-    /// before.
-    #[must_use]
-    #[inline(always)]
-    pub fn curve(
-        &self,
-        rung: Rung,
-        key: &KeyFrame,
-        older: Option<&Quadratic<'_>>,
-        x: u32,
-        y: u32,
-    ) -> Option<Curve> {
-        let grid = &self.grid;
-        let curve = match rung {
-            Rung::Hold => Some(Curve::default()),
-            Rung::Linear => Some(Curve::straight(key.displacement.at(x, y))),
-            Rung::Global => self.global.map(|global| global.curve(grid.centre(x, y))),
-            Rung::Affine => self.affine.curve(key, grid, x, y),
-            Rung::Quadratic => older.and_then(|older| older.curve(key, grid, x, y)),
-            Rung::World(order) => {
-                self.world(order).map(|world| world.curve(key, older, grid, x, y))
-            }
-            Rung::Flow => self.failed.at(grid.centre(x, y)).map(Curve::straight),
-        };
-        curve.filter(Curve::is_known)
-    }
-}
+/// Cells of which one look tells whether any of them moves.
+const STILL_RUN: usize = 256;
 
 /// Who says which rung a cell takes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -172,6 +57,8 @@ pub struct Ladder {
     late: Option<Pose>,
     /// Whether the trajectories of the newest key do not know it yet.
     is_late_new: bool,
+    /// Whether the motion of the newest key is zero everywhere.
+    is_still: bool,
     velocity: Plane<Velocity>,
     acceleration: Plane<Acceleration>,
 }
@@ -205,6 +92,7 @@ impl Ladder {
             evidence: Evidence::default(),
             late: None,
             is_late_new: false,
+            is_still: false,
             velocity: Plane::default(),
             acceleration: Plane::default(),
         })
@@ -242,6 +130,7 @@ impl Ladder {
             self.evidence.cut();
             return;
         }
+        self.is_still = is_still(key);
         let mut models = self.prepare(pool, key);
         if !matches!(self.choice, Choice::Always(_)) {
             let followed = older.filter(|older| key.motion_from == Some(older.content_time));
@@ -250,7 +139,8 @@ impl Ladder {
                 flow.find_failed(pool, key, older, &mut models.failed);
             }
             let points = models.lattice.points();
-            let rests = is_evidence && self.late.is_none() && is_at_rest(key, &models);
+            let rests =
+                is_evidence && self.is_still && self.late.is_none() && models.failed.is_empty();
             if !rests || !self.evidence.rest(points) {
                 self.weigh(pool, key, &models, followed, before);
             }
@@ -342,7 +232,7 @@ impl Ladder {
         let uses_global = match self.choice {
             Choice::Always(rung) => rung == Rung::Global,
             Choice::World => false,
-            Choice::Evidence => self.evidence.asks_for_global() && !is_still(key),
+            Choice::Evidence => !self.is_still && self.evidence.asks_for_global(),
         };
         models.global = if uses_global { Homography::fit(key, &models.grid) } else { None };
         if !matches!(self.choice, Choice::Always(_)) {
@@ -402,7 +292,7 @@ impl Ladder {
         let is_decoded = key.velocity.data().len() == key.displacement.data().len();
         // Held, or gone by a motion of zero: the same.
         let is_own = one_for_all == Some(Rung::Linear)
-            || (one_for_all == Some(Rung::Hold) && is_decoded && is_still(key));
+            || (one_for_all == Some(Rung::Hold) && is_decoded && self.is_still);
         if is_own && is_decoded {
             // The field as it was decoded.
             key.acceleration.resize(0, 0);
@@ -451,15 +341,11 @@ impl Ladder {
     }
 }
 
-/// Whether neither the motion of `key` nor its picture says that anything moves.
-fn is_at_rest(key: &KeyFrame, models: &Models) -> bool {
-    let is_decoded = key.velocity.data().len() == key.displacement.data().len();
-    is_decoded && models.failed.is_empty() && is_still(key)
-}
-
-/// Whether the motion of `key` is zero everywhere.
+/// Whether the motion of `key`, as it was decoded, is zero everywhere.
 fn is_still(key: &KeyFrame) -> bool {
-    key.velocity.data().iter().all(|velocity| *velocity == Velocity::default())
+    let is_decoded = key.velocity.data().len() == key.displacement.data().len();
+    let moves = |run: &[Velocity]| run.iter().fold(0, |any, v| any | v.x | v.y) != 0;
+    is_decoded && !key.velocity.data().chunks(STILL_RUN).any(moves)
 }
 
 /// Fills in a row, sample by sample: runs of samples that share a rung, and cells of others, which

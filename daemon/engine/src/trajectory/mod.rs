@@ -20,6 +20,7 @@ pub mod global;
 pub mod grid;
 pub mod ladder;
 pub mod lattice;
+pub mod models;
 pub mod quadratic;
 pub mod rung;
 pub mod surface;

@@ -1,7 +1,8 @@
 //! One window of the desktop, and the streams that are shown in it: one, or several side by side.
 //!
-//! Each stream has a column of the window, all of the same width, the oldest at the left. With several, each draws on a surface of its own inside the window and is told
-//! of its frames by itself, so that none waits for another; the window's own surface is black.
+//! Each stream has a column of the window, all of the same width, the oldest at the left. With
+//! several, each draws on a surface of its own inside the window and is told of its frames by
+//! itself, so that none waits for another; the window's own surface is black.
 
 use std::sync::Arc;
 

@@ -114,8 +114,8 @@ impl Picture<'_> {
         self.columns.shown.is_empty() && self.size[1] == self.place.height as usize
     }
 
-    /// Draws row `y`, counted from the top of the picture's place, into `row`, which has the bytes of
-    /// its texels alone.
+    /// Draws row `y`, counted from the top of the picture's place, into `row`, which has the bytes
+    /// of its texels alone.
     pub(super) fn draw_row(&self, y: u32, row: &mut [u8]) {
         let [width, height] = self.size;
         let source_y = y as usize * height / self.place.height as usize;

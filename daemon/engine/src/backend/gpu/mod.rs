@@ -292,7 +292,8 @@ impl GpuBackend {
         Ok(())
     }
 
-    /// Gives the levels their sizes, and sends up the weights of tiles, and once the light of levels.
+    /// Gives the levels their sizes, and sends up the weights of tiles, and once the light of
+    /// levels.
     fn prepare_finish(
         &mut self,
         split: &Split<'_>,

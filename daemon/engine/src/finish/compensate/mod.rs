@@ -1,8 +1,8 @@
 //! From a picture and its blur to a key, or to an in-between frame.
 //!
-//! Per channel but alpha, which stays, with `o` the picture, `s` its blur, `w` how far it is blurred
-//! there ([`super::selection`], of 128; everywhere 128 without a selection) and N the frames that
-//! share the light:
+//! Per channel but alpha, which stays, with `o` the picture, `s` its blur, `w` how far it is
+//! blurred there ([`super::selection`], of 128; everywhere 128 without a selection) and N the
+//! frames that share the light:
 //!
 //! ```text
 //! (0) b     = ((128 - w) o + w s + 64) >> 7
@@ -12,10 +12,10 @@
 //! ```
 //!
 //! Divisions round to the nearest, N l(o) - full is 0 where it would be below. D is how far key and
-//! in-between frames may differ (`foreframe_perception::flicker`), full where there is no limit.
-//! A key is (3) and an in-between frame is (2), so that over N frames of one surface the light is N
-//! times that of `o`, whatever w is, if it is the same for all of them. Where w is 0 nothing changes.
-//! Exactness: `Exact`.
+//! in-between frames may differ (`foreframe_perception::flicker`), full where there is no limit. A
+//! key is (3) and an in-between frame is (2), so that over N frames of one surface the light is N
+//! times that of `o`, whatever w is, if it is the same for all of them. Where w is 0 nothing
+//! changes. Exactness: `Exact`.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;

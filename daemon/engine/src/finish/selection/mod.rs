@@ -13,8 +13,9 @@
 //! (4) w = max(d, c), over the tile, over what lies within r of it and a tile more, then [1 2 1]^2
 //! ```
 //!
-//! w is 1 where no velocity is known. (4) reaches over what will be uncovered, which lies no further
-//! than r from the edge that uncovers it. A pan, a slow zoom and a still camera blur nothing.
+//! w is 1 where no velocity is known. (4) reaches over what will be uncovered, which lies no
+//! further than r from the edge that uncovers it. A pan, a slow zoom and a still camera blur
+//! nothing.
 //!
 //! The weight belongs to the surface: at phase p a tile has the weight of the place that it came
 //! from by the velocity at its middle ([`Selection::weights`]),

@@ -1,10 +1,10 @@
 //! Where a key's own motion does not explain its picture, and flow does.
 //!
 //! A block of the key is looked at by the motion of the cells at its centre and near its corners
-//! first: most are explained by one of them. What is not is doubted. Where a block near it was doubted
-//! in the key before, it is looked at pixel by pixel ([`super::own`]), by the motion of each and but
-//! for those that were hidden before, as outlines may run through it. A picture that is another all
-//! of a sudden, as at a cut, so costs no search:
+//! first: most are explained by one of them. What is not is doubted. Where a block near it was
+//! doubted in the key before, it is looked at pixel by pixel ([`super::own`]), by the motion of
+//! each and but for those that were hidden before, as outlines may run through it. A picture that
+//! is another all of a sudden, as at a cut, so costs no search:
 //!
 //! ```text
 //! (5) failed    where SAD(D) > NOISE + contrast / 4

@@ -1,8 +1,8 @@
 //! Memory that the compositor reads pictures from: one file in memory, cut into buffers.
 //!
 //! A picture is written with `pwrite`, not through a mapping: the compositor has the file as well
-//! and could write to it, so no slice of it is formed, and the engine cannot draw in it. A seal that
-//! keeps others from writing would keep most compositors from mapping it at all. So one copy
+//! and could write to it, so no slice of it is formed, and the engine cannot draw in it. A seal
+//! that keeps others from writing would keep most compositors from mapping it at all. So one copy
 //! remains, and what is to be converted is converted on the way. What lies around the picture is
 //! zero from the start.
 
