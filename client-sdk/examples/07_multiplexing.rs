@@ -3,7 +3,8 @@
 //! 37.5 % of the pixels are never rendered.
 //!
 //! For applications that are fast enough for the display's rate, nearly. Below 90 key frames a
-//! second the eye sees full and reduced pictures alternate.
+//! second the eye sees full and reduced pictures alternate. A picture that is to stay is sent in full
+//! twice: the second time it is shown as it is.
 
 mod clock;
 

@@ -377,6 +377,9 @@ impl Engine {
         if ladder.catch_up(&self.pool, key, self.previous.as_ref()) {
             let method = self.config.method.warp();
             self.backend.take_field(&self.pool, method, key, &self.scratch.map);
+            if let Some(finish) = &mut self.finish {
+                finish.take_field(key, &self.scratch.map);
+            }
         }
     }
 

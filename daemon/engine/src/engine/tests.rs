@@ -1,6 +1,7 @@
 //! The engine as its users see it: keys in, frames out.
 
 use super::*;
+use crate::finish::FinishMode;
 use crate::format::{CameraMotion, MotionConvention, MotionDirection, MotionFormat, MotionUnit};
 use crate::key::PlaneInput;
 
@@ -183,7 +184,6 @@ mod on_gpus {
 
 #[test]
 fn finishing_is_off_by_default_and_on_it_shares_the_light_of_a_key_among_its_frames() {
-    use crate::finish::{FinishConfig, FinishMode};
     let with = |mode| {
         let finish = FinishConfig { mode, is_whole: true, ..FinishConfig::default() };
         let config = EngineConfig { finish, ..EngineConfig::new(Method::Hold, NonZeroUsize::MIN) };
@@ -210,8 +210,8 @@ fn finishing_is_off_by_default_and_on_it_shares_the_light_of_a_key_among_its_fra
     }
 }
 
-/// Pushes a key of noise by `seed`, whose vectors claim 3 pixels right.
-fn push_place(engine: &mut Engine, at_ms: i64, seed: u32, moved: u32) {
+/// Pushes a key of noise by `seed`, whose vectors claim `claimed` pixels right.
+fn push_place(engine: &mut Engine, at_ms: i64, seed: u32, moved: u32, claimed: f32) {
     let (width, height) = (128, 64);
     let shown = |x: u32, y: u32| {
         let (x, y) = (x.wrapping_sub(moved), y);
@@ -221,7 +221,7 @@ fn push_place(engine: &mut Engine, at_ms: i64, seed: u32, moved: u32) {
     let color: Vec<u8> =
         (0..height).flat_map(|y| (0..width).flat_map(move |x| [shown(x, y); 4])).collect();
     let motion: Vec<u8> =
-        (0..width * height).flat_map(|_| [3.0_f32, 0.0]).flat_map(f32::to_le_bytes).collect();
+        (0..width * height).flat_map(|_| [claimed, 0.0]).flat_map(f32::to_le_bytes).collect();
     let plane =
         |bytes, bytes_per_pixel| PlaneInput::packed(bytes, [width, height], bytes_per_pixel);
     let content_time = MonoTime::ZERO + MonoSpan::from_ms(at_ms);
@@ -247,10 +247,46 @@ fn no_frame_moves_after_a_cut_that_nobody_declared_and_a_skipped_key_is_no_cut()
     let mut moving = Vec::new();
     // Three keys of a place, one of them skipped, then another place.
     for (at_ms, seed, moved) in [(25, 1, 3), (50, 1, 6), (100, 1, 12), (125, 2, 15), (150, 2, 18)] {
-        push_place(&mut engine, at_ms, seed, moved);
+        push_place(&mut engine, at_ms, seed, moved, 3.0);
         let key = frame(&mut engine, at_ms);
         let after: Vec<_> = [6, 12, 18].map(|ms| frame(&mut engine, at_ms + ms)).into();
         moving.push(after.iter().filter(|frame| **frame != key).count());
     }
     assert_eq!(moving[1..], [3, 3, 0, 3], "frames that move, by key");
+}
+
+#[test]
+fn a_cut_between_two_places_in_which_nothing_moves_is_noticed() {
+    let format = StreamFormat { width: 128, height: 64, ..format() };
+    let mut engine = Engine::new(format, EngineConfig::new(Method::Auto, NonZeroUsize::MIN));
+    let is_cut: Vec<bool> = [(25, 1), (50, 1), (75, 1), (100, 2), (125, 2)]
+        .into_iter()
+        .map(|(at_ms, seed)| {
+            push_place(&mut engine, at_ms, seed, 0, 0.0);
+            let (_, _, evidence) = engine.newest_seen().unwrap();
+            evidence.unwrap().is_cut()
+        })
+        .collect();
+    assert_eq!(is_cut, [false, false, false, true, false]);
+}
+
+#[test]
+fn a_picture_that_comes_to_rest_is_not_blurred() {
+    let format = StreamFormat { width: 128, height: 64, ..format() };
+    let shown = |mode| {
+        let finish = FinishConfig { mode, ..FinishConfig::default() };
+        let config = EngineConfig { finish, ..EngineConfig::new(Method::Auto, NonZeroUsize::MIN) };
+        let mut engine = Engine::new(format, config);
+        let mut pictures = Vec::new();
+        for key in 1..=8 {
+            let moved = key.min(4);
+            let claimed = if key <= 4 { 3.0 } else { 0.0 };
+            push_place(&mut engine, 25 * i64::from(key), 1, 3 * moved, claimed);
+            pictures.push([0, 8, 16].map(|ms| frame(&mut engine, 25 * i64::from(key) + ms)));
+        }
+        pictures
+    };
+    let (off, on) = (shown(FinishMode::Off), shown(FinishMode::On));
+    // What was paid for while it moved has been shown by then.
+    assert_eq!(off[5..], on[5..]);
 }

@@ -170,6 +170,8 @@ pub struct Evidence {
     /// Per sample the index of the rung that it and all around it take, or [`MIXED`].
     shared: Plane<u8>,
     trust: Trust,
+    /// Whether nothing moves in the newest key.
+    is_at_rest: bool,
     /// Keys taken in.
     count: u32,
     order: CameraOrder,
@@ -189,6 +191,7 @@ impl Default for Evidence {
             leads: Plane::default(),
             shared: Plane::default(),
             trust: Trust::default(),
+            is_at_rest: false,
             count: 0,
             order: CameraOrder::default(),
             order_errors: None,
@@ -212,6 +215,7 @@ impl Evidence {
         let lattice = models.lattice();
         std::mem::swap(&mut self.samples, &mut self.older);
         self.count = self.count.wrapping_add(1);
+        self.is_at_rest = false;
         let turns = if orders_alone { ORDER_TURNS } else { TURNS };
         let measuring = Measuring {
             lattice,
@@ -270,9 +274,17 @@ impl Evidence {
             return false;
         }
         self.trust.clear();
+        self.is_at_rest = true;
         self.leads.data_mut().fill(Lead::by(Rung::Hold));
         self.shared.data_mut().fill(index_of(Rung::Hold) as u8);
         true
+    }
+
+    /// Whether nothing moves in the newest key. What [`Evidence::samples`] says is then of the last
+    /// key in which something did.
+    #[must_use]
+    pub fn is_at_rest(&self) -> bool {
+        self.is_at_rest
     }
 
     /// Whether luma has shown that the newest key is a cut that nobody declared.

@@ -91,6 +91,13 @@ impl Finish {
         selection.take_key(pool, key, map, evidence, since_older, self.ledger.oldest_age());
     }
 
+    /// A late camera has changed the field of the newest key.
+    pub fn take_field(&mut self, key: &KeyFrame, map: &FieldMap) {
+        if let Some(selection) = &mut self.selection {
+            selection.take_field(key, map);
+        }
+    }
+
     /// What the next picture is, which shows the scene at `phase` after the newest key.
     pub(crate) fn next_part(&mut self, phase: Phase) -> Part {
         let part = self.ledger.next_part();

@@ -133,18 +133,15 @@ impl Axis {
         self.weights.clear();
         for index in 0..small {
             let (from, to) = (edge(index), edge(index + 1));
-            let start = self.weights.len();
-            self.parts.push(((from >> 8) as u32, start as u32));
-            let mut at = from;
+            self.parts.push(((from >> 8) as u32, self.weights.len() as u32));
+            // Of the part up to a pixel's end, so that what rounding drops comes back further on.
+            let (mut at, mut done) = (from, 0);
             while at < to {
-                let end = ((at >> 8) + 1) << 8;
-                self.weights.push((256 * (end.min(to) - at) / (to - from)) as u32);
-                at = end;
+                at = (((at >> 8) + 1) << 8).min(to);
+                let up_to = (256 * (at - from) / (to - from)) as u32;
+                self.weights.push(up_to - done);
+                done = up_to;
             }
-            // What rounding down has left over goes to the middle.
-            let weights = &mut self.weights[start..];
-            let sum: u32 = weights.iter().sum();
-            weights[weights.len() / 2] += 256 - sum;
         }
         self.parts.push((full, self.weights.len() as u32));
     }

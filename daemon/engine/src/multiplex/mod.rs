@@ -22,7 +22,8 @@
 //!
 //! A full key makes up for the next reduced one only where the one before it was reduced: the first
 //! key of all, and one after a key that got lost, are shown as they are. So one lost key costs the
-//! light of one difference, and the next pair is right again.
+//! light of one difference, and the next pair is right again. A picture that stays, as in a menu,
+//! would stay with its detail twice: an application that stops sends its last full key once more.
 //!
 //! Departures: `D` and the filter of reduced keys are ours ([`lowpass`]), so that the application
 //! renders at the smaller size as it always does, and not through a wide filter of its own.

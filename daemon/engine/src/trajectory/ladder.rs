@@ -135,12 +135,12 @@ impl Ladder {
         if !matches!(self.choice, Choice::Always(_)) {
             let followed = older.filter(|older| key.motion_from == Some(older.content_time));
             let is_evidence = self.choice == Choice::Evidence;
-            if let Some((flow, older)) = flow.zip(followed).filter(|_| is_evidence) {
-                flow.find_failed(pool, key, older, &mut models.failed);
-            }
+            let looked = flow.zip(followed).filter(|_| is_evidence);
+            let is_explained = looked.is_some_and(|(flow, older)| {
+                flow.find_failed(pool, key, older, &mut models.failed)
+            });
             let points = models.lattice.points();
-            let rests =
-                is_evidence && self.is_still && self.late.is_none() && models.failed.is_empty();
+            let rests = self.is_still && self.late.is_none() && is_explained;
             if !rests || !self.evidence.rest(points) {
                 self.weigh(pool, key, &models, followed, before);
             }

@@ -89,6 +89,15 @@ impl Selection {
         self.by_age.insert(0, newest);
     }
 
+    /// The newest key goes on otherwise than it did: its field is `key`'s now. What that uncovers
+    /// beside what was to be uncovered is not blurred.
+    pub fn take_field(&mut self, key: &KeyFrame, map: &FieldMap) {
+        if let Some(newest) = self.by_age.first() {
+            let size = [newest.width(), newest.height()];
+            tiles::motion(key, map, size, &mut self.motion);
+        }
+    }
+
     /// Brings along the weights of the keys before, and gives room for those of one more.
     fn make_room(&mut self, size: [u32; 2], since_older: Option<Phase>, older: usize) -> Plane<u8> {
         let is_same_size = self.by_age.first().is_some_and(|it| [it.width(), it.height()] == size);

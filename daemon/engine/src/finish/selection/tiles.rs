@@ -142,7 +142,8 @@ fn cost(evidence: &Evidence, columns: [usize; 2], rows: [usize; 2]) -> u8 {
         let [first, last] = ends.map(|cell| cell as u32 / STRIDE);
         first..=last.min(count - 1)
     };
-    if leads.data().is_empty() || samples.data().len() != leads.data().len() {
+    let has_none = leads.data().is_empty() || samples.data().len() != leads.data().len();
+    if has_none || evidence.is_at_rest() {
         return 0;
     }
     let mut most = 0;

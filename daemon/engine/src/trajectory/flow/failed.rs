@@ -145,6 +145,11 @@ impl Failing {
         marks.data().contains(&true)
     }
 
+    /// Whether a block of the key that was marked last is doubted.
+    pub(super) fn doubts(&self) -> bool {
+        self.doubted.data().contains(&true)
+    }
+
     /// Marks the blocks of the coarser levels that hold marked ones.
     pub(super) fn spread(&mut self, levels: &[Level]) {
         self.wanted.resize_with(levels.len().max(self.wanted.len()), Plane::default);

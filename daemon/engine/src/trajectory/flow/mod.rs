@@ -85,29 +85,31 @@ impl Flow {
     }
 
     /// Finds in `found` where the motion of `newest`, which points back to `older`, does not
-    /// explain its picture, and what does. Little work where it does everywhere.
+    /// explain its picture, and what does. Little work where it does everywhere. Returns whether it
+    /// does: the pictures can be compared, and no block is doubted.
     pub fn find_failed(
         &mut self,
         pool: &ThreadPool,
         newest: &KeyFrame,
         older: &KeyFrame,
         found: &mut FailedField,
-    ) {
+    ) -> bool {
         found.clear();
         if !self.take_pictures(pool, newest, older) {
-            return;
+            return false;
         }
         let Self { newest: now, older: then, search, failing, .. } = self;
         let own = Own::new(newest, older);
         let times = [newest.content_time, older.content_time];
         if !failing.mark(pool, &own, [now.finest(), then.finest()], times) {
-            return;
+            return !failing.doubts();
         }
         now.complete(pool);
         then.complete(pool);
         failing.spread(now.levels());
         search.find(pool, now, then, Some(failing.wanted()));
         failing.keep(pool, &own, [now.finest(), then.finest()], search, found);
+        false
     }
 
     /// Has luma of both keys. Returns false where the two cannot be compared.
