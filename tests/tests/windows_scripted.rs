@@ -354,3 +354,39 @@ fn a_stream_whose_frames_are_stuck_does_not_delay_the_one_beside_it() {
     }
     stage.strike();
 }
+
+#[test]
+fn a_stream_that_is_idle_gets_the_place_of_the_one_that_ends_beside_it() {
+    let mut stage = Stage::set_with(Script::GOOD, SIDE_BY_SIDE);
+    let mut second = stage.client.open_stream(2, 32, 32);
+    stage.compositor.order(Order::Resize([400, 100]));
+    let place = |it: &Seen| (it.position, it.destination, it.buffer);
+    let right = |seen: &[Seen]| {
+        let half = ([200, 0], Some([200, 100]), [64, 32]);
+        seen.iter().find(|it| it.is_cell && place(it) == half).cloned()
+    };
+    let patience = clock::now() + PATIENCE;
+    while right(&stage.compositor.seen()).is_none() {
+        assert!(clock::now() < patience, "{:?}: {}", stage.compositor.seen(), stage.log());
+        stage.client.submit(&mut stage.source, KEY);
+        stage.client.submit(&mut second, KEY);
+        stage.client.take_waiting();
+    }
+    stage.commits_in(250);
+    let idle = right(&stage.compositor.seen());
+    stage.commits_in(20);
+    assert_eq!(right(&stage.compositor.seen()), idle, "nobody has a picture of it to show");
+    stage.client.send(DestroyStream { stream: 1 });
+    let whole = ([0, 0], Some([400, 100]), [128, 32]);
+    let patience = clock::now() + PATIENCE;
+    loop {
+        let seen = stage.compositor.seen();
+        let mut cells = seen.iter().filter(|it| it.is_cell);
+        let is_alone = cells.next().is_some_and(|it| place(it) == whole && it.middle == KEY_SEEN);
+        if is_alone && cells.next().is_none() {
+            break;
+        }
+        assert!(clock::now() < patience, "{seen:?}: {}", stage.log());
+        std::thread::yield_now();
+    }
+}

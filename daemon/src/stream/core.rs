@@ -146,6 +146,8 @@ pub enum Told {
     Mode(MonoSpan),
     /// Whether anybody can see it.
     Visible(bool),
+    /// What it shows has another size or place, and takes it when a picture is handed over.
+    Moved,
 }
 
 /// Engine, pacer and display of one stream.
@@ -203,7 +205,7 @@ struct Shown {
     index: u64,
     presented_at: MonoTime,
     content_time: MonoTime,
-    /// Keys taken in when it was made. 0 if the display never showed it.
+    /// Keys taken in when it was made. 0 if it is to be shown again whatever comes.
     keys: u64,
     /// User interfaces taken in when it was made.
     uis: u64,
@@ -473,7 +475,18 @@ impl StreamCore {
                 }
             }
             Told::Visible(is_visible) => self.pacer.on_visibility(is_visible),
+            Told::Moved => {
+                self.shown = self.shown.map(|shown| Shown { keys: 0, ..shown });
+                self.pacer.on_news();
+            }
         }
+    }
+
+    /// Whether the next picture goes to the display although nothing in it is new: the display
+    /// does not have the one before, or not as it is to be.
+    #[must_use]
+    pub fn is_to_show_again(&self) -> bool {
+        self.shown.is_some_and(|shown| shown.keys == 0)
     }
 
     /// The picture for `planned` was counted as shown, and was not.

@@ -184,7 +184,7 @@ impl WindowDisplay {
                 trace!(planned = planned.as_ns(), "discarded");
                 self.awaited.retain(|one| one.present_at_ns != planned.as_ns());
             }
-            Told::Mode(_) | Told::Visible(_) => {}
+            Told::Mode(_) | Told::Visible(_) | Told::Moved => {}
         }
     }
 }

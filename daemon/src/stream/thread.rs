@@ -200,8 +200,9 @@ impl StreamThread {
             }
             self.hear_window();
             let plan = self.core.plan(clock::now());
-            let is_idle =
-                plan.content_time.is_none() || self.repeats_in_a_row >= REPEATS_BEFORE_IDLE;
+            let is_settled =
+                self.repeats_in_a_row >= REPEATS_BEFORE_IDLE && !self.core.is_to_show_again();
+            let is_idle = plan.content_time.is_none() || is_settled;
             let wake_at = if is_idle { MonoTime::FAR_FUTURE } else { plan.wake_at };
             if self.owes_picture && !is_idle {
                 clock::sleep_until(wake_at);

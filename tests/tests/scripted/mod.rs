@@ -59,6 +59,7 @@ pub(crate) struct Script {
     /// The surface inside a window that was made first gets no buffer back and no answer.
     pub(crate) starves_first_cell: bool,
     pub(crate) has_viewporter: bool,
+    pub(crate) has_subcompositor: bool,
     /// Times by `CLOCK_MONOTONIC_RAW`.
     pub(crate) is_raw: bool,
     pub(crate) announced_mhz: i32,
@@ -75,6 +76,7 @@ impl Script {
         releases: true,
         starves_first_cell: false,
         has_viewporter: true,
+        has_subcompositor: true,
         is_raw: false,
         announced_mhz: 100_000,
         interval: MonoSpan::from_ms(10),
@@ -229,6 +231,9 @@ struct Content {
     buffer: Option<WlBuffer>,
     callbacks: Vec<WlCallback>,
     feedbacks: Vec<WpPresentationFeedback>,
+    destination: Option<[i32; 2]>,
+    /// Applied by the window's commit.
+    position: Option<[i32; 2]>,
 }
 
 struct Buffer {
@@ -249,7 +254,6 @@ fn live(
     let socket = ListeningSocket::bind_absolute(path).unwrap();
     let mut handle = display.handle();
     handle.create_global::<State, WlCompositor, ()>(4, ());
-    handle.create_global::<State, WlSubcompositor, ()>(1, ());
     handle.create_global::<State, WlShm, ()>(1, ());
     handle.create_global::<State, WlSeat, ()>(5, ());
     for output in 0..OUTPUTS.len() {
@@ -257,6 +261,9 @@ fn live(
     }
     handle.create_global::<State, XdgWmBase, ()>(1, ());
     handle.create_global::<State, WpPresentation, ()>(1, ());
+    if script.has_subcompositor {
+        handle.create_global::<State, WlSubcompositor, ()>(1, ());
+    }
     if script.has_viewporter {
         handle.create_global::<State, WpViewporter, ()>(1, ());
     }
@@ -394,8 +401,14 @@ impl State {
             }
             self.configure(index);
         }
+        if let Role::Window { .. } = self.surfaces[index].role {
+            for it in &mut self.surfaces {
+                it.seen.position = it.pending.position.take().unwrap_or(it.seen.position);
+            }
+        }
         let starves = self.starves(index);
         let it = &mut self.surfaces[index];
+        it.seen.destination = it.pending.destination.take().or(it.seen.destination);
         let Some(buffer) = it.pending.buffer.take() else { return };
         self.commits += 1;
         it.seen.commits += 1;

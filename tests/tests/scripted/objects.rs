@@ -124,13 +124,13 @@ objects! {
         init.init(id, surface);
     };
     WlSubsurface, WlSurface => |state, request, _init, _resource, surface| if let wl_subsurface::Request::SetPosition { x, y } = request {
-        state.find(surface).seen.position = [x, y];
+        state.find(surface).pending.position = Some([x, y]);
     };
     WpViewporter, () => |_state, request, init, _resource, _data| if let wp_viewporter::Request::GetViewport { id, surface } = request {
         init.init(id, surface);
     };
     WpViewport, WlSurface => |state, request, _init, _resource, surface| if let wp_viewport::Request::SetDestination { width, height } = request {
-        state.find(surface).seen.destination = Some([width, height]);
+        state.find(surface).pending.destination = Some([width, height]);
     };
     WlShm, () => |state, request, init, _resource, _data| if let wl_shm::Request::CreatePool { id, fd, .. } = request {
         let pool: WlShmPool = init.init(id, ());

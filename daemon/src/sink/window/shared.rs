@@ -8,6 +8,7 @@ use std::sync::{Mutex, PoisonError};
 use winit::dpi::{LogicalSize, PhysicalSize};
 
 use super::{Closed, WindowEvent};
+use crate::stream::core::Told;
 
 /// A part of the desktop's window: one of `count` columns of the same width, from the left.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -84,14 +85,20 @@ impl Shared {
     }
 
     /// The desktop's window has `size` pixels, and `scale` of them for each of the desktop's own
-    /// units; `column` of it is ours.
+    /// units; `column` of it is ours. Tells if that is another place than before: a picture takes
+    /// the place that there is when it is handed over, and of an idle stream none may come.
     pub(super) fn set_place(&self, size: PhysicalSize<u32>, scale: f64, column: Column) {
         let logical: LogicalSize<u32> = size.to_logical(scale);
         let [_, width] = column.of(size.width);
         let [left, logical_width] = column.of(logical.width);
-        self.left.store(left, Ordering::Relaxed);
-        self.size.store(packed([width, size.height]), Ordering::Relaxed);
-        self.logical_size.store(packed([logical_width, logical.height]), Ordering::Relaxed);
+        let size = packed([width, size.height]);
+        let logical_size = packed([logical_width, logical.height]);
+        let was_left = self.left.swap(left, Ordering::Relaxed);
+        let was_size = self.size.swap(size, Ordering::Relaxed);
+        let was_logical_size = self.logical_size.swap(logical_size, Ordering::Relaxed);
+        if (was_left, was_size, was_logical_size) != (left, size, logical_size) {
+            self.tell(WindowEvent::Told(Told::Moved));
+        }
     }
 
     /// Where the window begins in the desktop's, in the desktop's own units.
@@ -146,5 +153,20 @@ mod tests {
             (shared.size(), shared.logical_size(), shared.left()),
             ([800, 600], [400, 300], 400)
         );
+    }
+
+    #[test]
+    fn another_place_is_told_and_the_same_place_is_not() {
+        let shared = Shared::new(|| {});
+        let column = |index| Column { index, count: 2 };
+        let set = |width, scale, index| {
+            shared.set_place(PhysicalSize::new(width, 600), scale, column(index));
+            shared.take_events()
+        };
+        let moved = [WindowEvent::Told(Told::Moved)];
+        for (width, scale, index) in [(800, 1.0, 0), (800, 1.0, 1), (800, 2.0, 1), (900, 2.0, 1)] {
+            assert_eq!(set(width, scale, index), moved, "{width} {scale} {index}");
+            assert_eq!(set(width, scale, index), [], "{width} {scale} {index}");
+        }
     }
 }
