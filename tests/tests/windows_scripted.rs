@@ -390,3 +390,44 @@ fn a_stream_that_is_idle_gets_the_place_of_the_one_that_ends_beside_it() {
         std::thread::yield_now();
     }
 }
+
+#[test]
+fn where_streams_cannot_be_side_by_side_each_gets_a_window() {
+    let lacking = [
+        ("wp_viewporter", Script { has_viewporter: false, ..Script::GOOD }),
+        ("wl_subcompositor", Script { has_subcompositor: false, ..Script::GOOD }),
+    ];
+    for (name, script) in lacking {
+        let mut stage = Stage::set_with(script, SIDE_BY_SIDE);
+        let mut second = stage.client.open_stream(2, 64, 32);
+        let patience = clock::now() + PATIENCE;
+        loop {
+            let seen = stage.compositor.seen();
+            if seen.iter().filter(|it| !it.is_cell && it.middle == KEY_SEEN).count() == 2 {
+                break;
+            }
+            assert!(clock::now() < patience, "{name}: {seen:?}: {}", stage.log());
+            stage.client.submit(&mut stage.source, KEY);
+            stage.client.submit(&mut second, KEY);
+            stage.client.take_waiting();
+        }
+        let log = stage.log();
+        assert_eq!(log.matches("each gets a window").count(), 1, "{log}");
+        assert!(log.contains(name), "{log}");
+        stage.strike();
+    }
+}
+
+#[test]
+fn what_is_behind_the_streams_fills_the_window_when_no_buffer_comes_back() {
+    let mut stage = Stage::set_with(Script { releases: false, ..Script::GOOD }, SIDE_BY_SIDE);
+    // Of one shape, so that its buffers serve all of them, and more than it has.
+    for times in 1..=8 {
+        let size = [100 * times, 50 * times];
+        stage.compositor.order(Order::Resize(size));
+        stage.show_until_seen(|seen| {
+            seen.iter().any(|it| !it.is_cell && it.fills.is_some() && it.destination == Some(size))
+        });
+    }
+    stage.strike();
+}

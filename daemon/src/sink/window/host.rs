@@ -13,7 +13,7 @@ use winit::event_loop::OwnedDisplayHandle;
 use winit::window::Window as DesktopWindow;
 
 use super::shared::{Column, Shared};
-use super::wayland::Backdrop;
+use super::wayland::{Backdrop, Role};
 use super::{Closed, WindowConfig, WindowError, WindowEvent};
 
 /// A window that is open.
@@ -41,7 +41,7 @@ impl Host {
     /// For any number of them.
     ///
     /// # Errors
-    /// If the display does not answer.
+    /// If the display does not answer, or lacks what streams need to share a window.
     pub(super) fn for_several(
         window: Arc<DesktopWindow>,
         display: &OwnedDisplayHandle,
@@ -49,6 +49,11 @@ impl Host {
     ) -> Result<Self, WindowError> {
         let backdrop = Backdrop::new(&window, display)?;
         Ok(Self { backdrop: Some(backdrop), window, refresh_interval, streams: Vec::new() })
+    }
+
+    /// What its streams draw on.
+    pub(super) fn role(&self) -> Role {
+        if self.backdrop.is_some() { Role::Part } else { Role::Whole }
     }
 
     /// Shows a stream beside the others. The window becomes as large as all need.

@@ -50,8 +50,8 @@ pub enum Layout {
     /// Each in a window of its own.
     #[default]
     Single,
-    /// All in one window, in columns of the same width. On Wayland alone: elsewhere each gets a
-    /// window.
+    /// All in one window, in columns of the same width. It needs Wayland with `wp_viewporter` and
+    /// `wl_subcompositor`: elsewhere each gets a window.
     SideBySide,
 }
 

@@ -35,6 +35,8 @@ use crate::stream::core::Told;
 const ANSWER_WITHIN: Duration = Duration::from_secs(5);
 /// Time between two looks at the refresh rates of monitors: not every display tells of a change.
 const MODE_POLL: Duration = Duration::from_millis(500);
+/// What the desktop calls a window that several streams share.
+const SHARED_TITLE: &str = "Foreframe";
 /// Time that the thread has to end before it is left behind.
 const END_WITHIN: Duration = Duration::from_secs(1);
 
@@ -253,7 +255,6 @@ impl Desktop {
         shared: &Arc<Shared>,
     ) -> Result<Opened, WindowError> {
         let is_shared = self.shares_windows(display);
-        let role = if is_shared { Role::Part } else { Role::Whole };
         let host = match self.windows.values_mut().next().filter(|_| is_shared) {
             Some(host) => host,
             None => self.open_host(display, config, is_shared)?,
@@ -263,17 +264,21 @@ impl Desktop {
             window: Arc::clone(&host.window),
             display: display.owned_display_handle(),
             refresh_interval: host.refresh_interval,
-            role,
+            role: host.role(),
         })
     }
 
-    /// Whether all streams are to be in one window, and can be.
+    /// Whether all streams are to be in one window, and can be as far as is known.
     fn shares_windows(&mut self, display: &ActiveEventLoop) -> bool {
         if self.options.layout == Layout::SideBySide && !display.is_wayland() {
-            warn!("streams are side by side on Wayland alone; each gets a window");
-            self.options.layout = Layout::Single;
+            self.leave_side_by_side("Wayland");
         }
         self.options.layout == Layout::SideBySide
+    }
+
+    fn leave_side_by_side(&mut self, lacking: &str) {
+        warn!(lacking, "streams cannot be side by side; each gets a window");
+        self.options.layout = Layout::Single;
     }
 
     fn open_host(
@@ -284,8 +289,8 @@ impl Desktop {
     ) -> Result<&mut Host, WindowError> {
         let monitor = find_monitor(display, self.options.monitor.as_deref())?;
         let size = PhysicalSize::new(config.format.width, config.format.height);
-        let mut attributes =
-            WindowAttributes::default().with_title(&config.title).with_inner_size(size);
+        let title = if is_shared { SHARED_TITLE } else { &config.title };
+        let mut attributes = WindowAttributes::default().with_title(title).with_inner_size(size);
         if self.options.is_fullscreen {
             attributes = attributes.with_fullscreen(Some(Fullscreen::Borderless(monitor)));
         } else if let Some(monitor) = monitor {
@@ -296,15 +301,24 @@ impl Desktop {
         let monitor = window.current_monitor().or_else(|| display.available_monitors().next());
         let refresh_interval = monitor.as_ref().and_then(refresh_interval);
         info!(
-            title = config.title,
+            title,
             monitor = monitor.as_ref().and_then(MonitorHandle::name),
             scale_factor = window.scale_factor(),
             "window opens"
         );
         let id = window.id();
-        let host = match is_shared {
-            true => Host::for_several(window, &display.owned_display_handle(), refresh_interval)?,
-            false => Host::new(window, refresh_interval),
+        let several = is_shared.then(|| {
+            let display = display.owned_display_handle();
+            Host::for_several(Arc::clone(&window), &display, refresh_interval)
+        });
+        let host = match several {
+            None => Host::new(window, refresh_interval),
+            Some(Err(WindowError::Lacks(lacking))) => {
+                self.leave_side_by_side(lacking);
+                window.set_title(&config.title);
+                Host::new(window, refresh_interval)
+            }
+            Some(host) => host?,
         };
         Ok(self.windows.entry(id).or_insert(host))
     }

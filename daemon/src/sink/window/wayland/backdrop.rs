@@ -25,6 +25,9 @@ pub(in crate::sink::window) struct Backdrop {
 
 impl Backdrop {
     /// For a window that is on Wayland.
+    ///
+    /// # Errors
+    /// If the display does not answer, or lacks what streams need to share a window.
     pub(in crate::sink::window) fn new(
         window: &Arc<DesktopWindow>,
         display: &OwnedDisplayHandle,
@@ -33,7 +36,7 @@ impl Backdrop {
         // Nobody waits for what happens to it.
         let shared = Arc::new(Shared::new(|| {}));
         let format = StreamFormat::rgba8(1, 1);
-        let surface = WaylandSurface::new(guest, &format, Arc::clone(&shared), Role::Whole)?;
+        let surface = WaylandSurface::new(guest, &format, Arc::clone(&shared), Role::Behind)?;
         Ok(Self { surface, shared, black: ColorPlane::new(format.color, 1, 1) })
     }
 
@@ -41,6 +44,7 @@ impl Backdrop {
     pub(in crate::sink::window) fn fill(&mut self, size: PhysicalSize<u32>, scale: f64) -> bool {
         self.shared.set_place(size, scale, Column::WHOLE);
         drop(self.shared.take_events());
-        self.surface.present(MonoTime::ZERO, &self.black)
+        // Black is black in any size: where no buffer is free, the one that is shown will do.
+        self.surface.present(MonoTime::ZERO, &self.black) || self.surface.stretch_shown()
     }
 }

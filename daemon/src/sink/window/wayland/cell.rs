@@ -21,11 +21,14 @@ pub(in crate::sink::window) enum Role {
     Whole,
     /// A surface inside it.
     Part,
+    /// The window's own surface, behind such surfaces.
+    Behind,
 }
 
-/// The role of a surface inside a window.
+/// A surface inside a window, and its role there. Taken out of the window when dropped.
 #[derive(Debug)]
 pub(super) struct Cell {
+    pub(super) surface: WlSurface,
     subsurface: WlSubsurface,
     window: WlSurface,
     /// Where it was put, in the desktop's own units. None before the first time.
@@ -33,12 +36,12 @@ pub(super) struct Cell {
 }
 
 impl Cell {
-    /// A new surface inside `window`, and its role there.
+    /// A new one inside `window`.
     pub(super) fn new(
         list: &GlobalList,
         handle: &QueueHandle<Listener>,
         window: &WlSurface,
-    ) -> Result<(WlSurface, Self), WindowError> {
+    ) -> Result<Self, WindowError> {
         let compositor: WlCompositor =
             list.bind(handle, 1..=4, ()).map_err(|_| WindowError::Lacks("wl_compositor"))?;
         let subcompositor: WlSubcompositor =
@@ -50,7 +53,7 @@ impl Cell {
         let subsurface = subcompositor.get_subsurface(&surface, window, handle, ());
         subsurface.set_desync();
         subcompositor.destroy();
-        Ok((surface, Self { subsurface, window: window.clone(), left: None }))
+        Ok(Self { surface, subsurface, window: window.clone(), left: None })
     }
 
     /// Puts it there, at the top.
@@ -61,10 +64,11 @@ impl Cell {
             self.window.commit();
         }
     }
+}
 
-    /// Takes `surface` out of the window.
-    pub(super) fn remove(&self, surface: &WlSurface) {
+impl Drop for Cell {
+    fn drop(&mut self) {
         self.subsurface.destroy();
-        surface.destroy();
+        self.surface.destroy();
     }
 }

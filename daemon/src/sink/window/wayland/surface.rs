@@ -32,6 +32,8 @@ use crate::sink::window::{Closed, Feedback, WindowError};
 const ANSWER_WITHIN: Duration = Duration::from_secs(5);
 /// Where a compositor has this, winit makes the surface's viewport, and there can be but one.
 const FRACTIONAL_SCALE: &str = "wp_fractional_scale_manager_v1";
+/// What streams need to share a window.
+const FOR_SEVERAL: [&str; 2] = ["wp_viewporter", "wl_subcompositor"];
 
 /// A window's surface.
 #[derive(Debug)]
@@ -114,10 +116,7 @@ impl WaylandSurface {
         };
         *answers.lock().unwrap_or_else(PoisonError::into_inner) =
             Answers::new(globals.presentation.is_some());
-        let (surface, cell) = match cell {
-            Some((surface, cell)) => (surface, Some(cell)),
-            None => (surface, None),
-        };
+        let surface = cell.as_ref().map_or(surface, |cell| cell.surface.clone());
         debug!(order = ?globals.order, stretch = ?globals.stretch, "surface");
         Ok(Self {
             shared,
@@ -162,6 +161,17 @@ impl WaylandSurface {
         self.ask(planned);
         self.stretch();
         self.commit(index)
+    }
+
+    /// Makes what was presented last fill the window as it is now, with no buffer more; false where
+    /// nothing was.
+    pub(super) fn stretch_shown(&mut self) -> bool {
+        if !self.surface.is_alive() || self.pool.is_none() {
+            return false;
+        }
+        self.stretch();
+        self.surface.commit();
+        self.flush()
     }
 
     /// Makes buffers of the window's shape, if there are none.
@@ -233,6 +243,10 @@ impl WaylandSurface {
         if let Some(cell) = &mut self.cell {
             cell.put(self.shared.left());
         }
+        self.flush()
+    }
+
+    fn flush(&self) -> bool {
         match self.connection.flush() {
             Ok(()) => true,
             // The rest goes out with the next frame.
@@ -259,9 +273,7 @@ impl Drop for WaylandSurface {
         if let Stretch::ByUs(viewport) = &self.globals.stretch {
             viewport.destroy();
         }
-        if let Some(cell) = &self.cell {
-            cell.remove(&self.surface);
-        }
+        drop(self.cell.take());
         if let Some(presentation) = &self.globals.presentation {
             presentation.destroy();
         }
@@ -278,7 +290,7 @@ impl Drop for WaylandSurface {
 
 type Bound = (EventQueue<Listener>, Listener);
 /// What the compositor offers, and the surface inside the window's where one was asked for.
-type Found = (Globals, Option<(WlSurface, Cell)>);
+type Found = (Globals, Option<Cell>);
 
 /// Binds what the surface needs, tells it, and gives back what goes on listening.
 fn bind(
@@ -294,18 +306,22 @@ fn bind(
             let handle = queue.handle();
             let shm: WlShm =
                 list.bind(&handle, 1..=1, ()).map_err(|_| WindowError::Lacks("wl_shm"))?;
-            let presentation: Option<WpPresentation> = list.bind(&handle, 1..=1, ()).ok();
             let has = |name: &str| {
                 list.contents().with_list(|all| all.iter().any(|one| one.interface == name))
             };
+            if role != Role::Whole
+                && let Some(lacking) = FOR_SEVERAL.into_iter().find(|name| !has(name))
+            {
+                return Err(WindowError::Lacks(lacking));
+            }
+            let presentation: Option<WpPresentation> = list.bind(&handle, 1..=1, ()).ok();
             let viewporter: Option<WpViewporter> = list.bind(&handle, 1..=1, ()).ok();
             let cell = match role {
-                Role::Whole => None,
+                Role::Whole | Role::Behind => None,
                 Role::Part => Some(Cell::new(&list, &handle, window)?),
             };
-            let surface = cell.as_ref().map_or(window, |(surface, _)| surface);
+            let surface = cell.as_ref().map_or(window, |cell| &cell.surface);
             let stretch = match viewporter {
-                None if cell.is_some() => return Err(WindowError::Lacks("wp_viewporter")),
                 Some(_) if cell.is_none() && has(FRACTIONAL_SCALE) => Stretch::ByWinit,
                 Some(viewporter) => Stretch::ByUs(viewporter.get_viewport(surface, &handle, ())),
                 None => Stretch::No,
