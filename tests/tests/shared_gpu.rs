@@ -17,25 +17,42 @@ use rendered::{INTERVAL, Rendered};
 const SMALL: Size = Size { width: 96, height: 54 };
 const LARGE: Size = Size { width: 640, height: 360 };
 
+/// Says that it is over when its thread ends, however that ends.
+struct Ending<'a>(&'a AtomicBool);
+
+impl Drop for Ending<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+/// An engine on `gpu` that has taken in two keys.
+fn engine_with_keys(gpu: &Arc<Gpu>, size: Size) -> Engine {
+    let rendered = Rendered::new(&SCENES[0], size, [2.0; 2], 2);
+    let config = EngineConfig::new(Method::Linear, NonZeroUsize::MIN);
+    let mut engine = Engine::new(rendered.format, config);
+    engine.use_gpu(gpu);
+    for key in 0..2 {
+        let content_time = MonoTime::ZERO + INTERVAL.scale(key + 1, 1);
+        rendered.with_input(key as usize, content_time, |input| {
+            engine.push_key(input).expect("the key is as declared");
+        });
+    }
+    engine
+}
+
 /// How many pictures each of two streams gets until the second has `enough`.
 fn pictures(gpu: &Arc<Gpu>, sizes: [Size; 2], enough: u32) -> [u32; 2] {
     let counts = [0, 0].map(AtomicU32::new);
     let is_over = AtomicBool::new(false);
     let start = Barrier::new(2);
+    // Whoever comes to the barrier has nothing left to fail at before it.
+    let engines = sizes.map(|size| engine_with_keys(gpu, size));
     thread::scope(|scope| {
-        for (index, size) in sizes.into_iter().enumerate() {
+        for (index, mut engine) in engines.into_iter().enumerate() {
             let (counts, is_over, start) = (&counts, &is_over, &start);
             scope.spawn(move || {
-                let rendered = Rendered::new(&SCENES[0], size, [2.0; 2], 2);
-                let config = EngineConfig::new(Method::Linear, NonZeroUsize::MIN);
-                let mut engine = Engine::new(rendered.format, config);
-                engine.use_gpu(gpu);
-                for key in 0..2 {
-                    let content_time = MonoTime::ZERO + INTERVAL.scale(key + 1, 1);
-                    rendered.with_input(key as usize, content_time, |input| {
-                        engine.push_key(input).expect("the key is as declared");
-                    });
-                }
+                let _ending = Ending(is_over);
                 let mut picture = ColorPlane::default();
                 start.wait();
                 let mut phase = 0;
