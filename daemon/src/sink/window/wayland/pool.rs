@@ -173,34 +173,37 @@ mod tests {
             window in [1_u32..900, 1_u32..900],
             is_scaled: bool,
             is_bgr: bool,
-            index in 0_u64..2,
+            first in 0_u64..2,
         ) {
             let placement = match is_scaled {
                 true => Placement::scaled(size, window),
                 false => Placement::padded(size, window),
             };
-            let mut frame = ColorPlane::new(StreamFormat::rgba8(1, 1).color, size[0], size[1]);
-            for (at, byte) in frame.as_mut_bytes().iter_mut().enumerate() {
-                *byte = u8::try_from(at % 251 + 1).expect("at most 251");
-            }
             let order = if is_bgr { ByteOrder::Bgrx } else { ByteOrder::Rgbx };
             let mut texels = Texels::new(&StreamFormat::rgba8(size[0], size[1]), order);
             let mut file = File::from(create_memfd("test").expect("memory"));
             let bytes = placement.byte_len();
             file.set_len(2 * bytes as u64).expect("memory");
-            let picture = texels.picture(&frame, &placement);
-            let start = index * bytes as u64;
-            Band::new(&placement).write(&file, start, &placement, &picture).expect("memory");
+            let mut expected = vec![0; 2 * bytes];
+            let mut band = Band::new(&placement);
+            // Different in every byte, one after the other into the two buffers.
+            for (index, offset) in [(first, 1), (1 - first, 2)] {
+                let mut frame = ColorPlane::new(StreamFormat::rgba8(1, 1).color, size[0], size[1]);
+                for (at, byte) in frame.as_mut_bytes().iter_mut().enumerate() {
+                    *byte = u8::try_from(at % 251 + offset).expect("at most 252");
+                }
+                let picture = texels.picture(&frame, &placement);
+                let start = index * bytes as u64;
+                band.write(&file, start, &placement, &picture).expect("memory");
+                let row_len = placement.row_len();
+                let Rect { x, y, width, height } = placement.picture;
+                for row in 0..height {
+                    let from = start as usize + (y + row) as usize * row_len + x as usize * 4;
+                    picture.draw_row(row, &mut expected[from..][..width as usize * 4]);
+                }
+            }
             let mut written = Vec::new();
             file.read_to_end(&mut written).expect("memory");
-
-            let mut expected = vec![0; 2 * bytes];
-            let row_len = placement.row_len();
-            let Rect { x, y, width, height } = placement.picture;
-            for row in 0..height {
-                let from = start as usize + (y + row) as usize * row_len + x as usize * 4;
-                picture.draw_row(row, &mut expected[from..][..width as usize * 4]);
-            }
             prop_assert!(written == expected, "{placement:?}");
         }
     }
