@@ -166,7 +166,8 @@ impl StreamOptions {
     /// The display that the picture is for, by the name of a profile that the daemon knows: a
     /// built-in one (`foreframe perception displays`) or one of its user. It takes the place of the
     /// daemon's `--profile`. A name that the daemon does not know ends the stream with an error
-    /// ([`ErrorCode::Unsupported`](crate::ErrorCode::Unsupported)) that lists those it knows.
+    /// ([`ErrorCode::Unsupported`](crate::ErrorCode::Unsupported)) that lists as many as fit of those
+    /// it knows.
     pub fn display_profile(mut self, name: ProfileName) -> Self {
         self.format.display_profile = Some(name);
         self

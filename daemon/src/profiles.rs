@@ -13,6 +13,10 @@ use foreframe_protocol::ProfileName;
 
 use crate::config::UsageError;
 
+/// Bytes that the names there are may take: as many as fit into an
+/// [`ErrorMessage`](foreframe_protocol::ErrorMessage).
+const LIST_BYTES: usize = 224;
+
 /// Profiles of the user. The built-in ones are always there; one of the user's with the same name
 /// stands before it.
 #[derive(Clone, PartialEq, Debug, Default)]
@@ -35,7 +39,7 @@ pub struct Viewed {
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("display profile: expected one of {expected}, found `{found}`")]
 pub struct UnknownProfile {
-    /// The names there are.
+    /// The names there are, as many as fit into 224 bytes, and how many more.
     pub expected: String,
     /// The name that was asked for.
     pub found: String,
@@ -88,10 +92,8 @@ impl Profiles {
         if let Some(own) = self.own.iter().find(|own| own.name() == name) {
             return Ok(own.clone());
         }
-        DisplayProfile::builtin(name).map_err(|_| UnknownProfile {
-            expected: self.names().join(", "),
-            found: name.to_owned(),
-        })
+        DisplayProfile::builtin(name)
+            .map_err(|_| UnknownProfile { expected: listed(&self.names()), found: name.to_owned() })
     }
 
     /// The user's names, then the built-in ones.
@@ -101,6 +103,19 @@ impl Profiles {
         let builtin = DisplayProfile::builtin_names().filter(|name| is_left(name));
         own.chain(builtin.map(|name| name as &str)).collect()
     }
+}
+
+/// As many of the names as there is room for, and how many are left.
+fn listed(names: &[&str]) -> String {
+    let of_first = |count: usize| {
+        let list = names[..count].join(", ");
+        match names.len() - count {
+            0 => list,
+            left => format!("{list} and {left} more"),
+        }
+    };
+    let fitting = (0..=names.len()).rev().map(of_first).find(|list| list.len() <= LIST_BYTES);
+    fitting.unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -132,6 +147,22 @@ mod tests {
         assert!(error.expected.starts_with("mine, htc-vive, asus-pg279q"), "{error}");
         assert_eq!(error.expected.matches("htc-vive").count(), 1);
         assert!(Profiles::default().named("mine").is_err(), "it is nobody else's");
+    }
+
+    #[test]
+    fn a_list_of_names_that_is_too_long_for_an_error_ends_with_how_many_are_left() {
+        let names: Vec<_> = (10..60).map(|index| format!("profile-{index}")).collect();
+        for count in 0..names.len() {
+            let some: Vec<_> = names[..count].iter().map(String::as_str).collect();
+            let list = listed(&some);
+            assert!(list.len() <= LIST_BYTES, "{list}");
+            let (told, left) = list.rsplit_once(" and ").unwrap_or((&list, "0 more"));
+            let told = told.split(", ").filter(|name| !name.is_empty()).count();
+            let left = left.strip_suffix(" more").and_then(|left| left.parse().ok());
+            assert_eq!(left, Some(count - told), "{list}");
+            assert_eq!(count <= 18, told == count, "{list}");
+            assert!(told == count || told > 15, "{list}");
+        }
     }
 
     #[test]
