@@ -87,8 +87,8 @@ pub struct Args {
     #[arg(long)]
     #[serde(default, deserialize_with = "from_name")]
     pub finish: Option<FinishMode>,
-    /// Where pictures are finished, blur all of an in-between frame: sharper where things move, but
-    /// not only where its motion is not to be relied on
+    /// Where pictures are finished, blur all of an in-between frame, not only where its motion is
+    /// not to be relied on; sharper where things move
     #[arg(long)]
     #[serde(default)]
     pub finish_whole: bool,

@@ -53,8 +53,8 @@ pub struct Args {
     /// is seen.
     #[arg(long, default_value_t = FinishMode::Off)]
     pub finish: FinishMode,
-    /// With --finish, blur all of an in-between frame: sharper where things move, but not only
-    /// where its motion is not to be relied on.
+    /// With --finish, blur all of an in-between frame, not only where its motion is not to be
+    /// relied on; sharper where things move.
     #[arg(long)]
     pub finish_whole: bool,
     /// Leave out in-between frames until something has moved by so many pixels, 0 to 16.
