@@ -53,7 +53,11 @@ impl Profiles {
     /// a name is longer than a stream can say.
     pub fn read(folder: &Path) -> Result<Self, UsageError> {
         let wrong = |path: &Path, error: &dyn fmt::Display| {
-            UsageError(format!("--profiles: {}: {error}", path.display()))
+            UsageError(format!(
+                "--profiles: expected a folder of display profiles, files that end in .toml, found \
+                 {}: {error}",
+                path.display()
+            ))
         };
         let entries = fs::read_dir(folder).map_err(|error| wrong(folder, &error))?;
         let entries: Result<Vec<_>, _> = entries.map(|entry| Ok(entry?.path())).collect();
