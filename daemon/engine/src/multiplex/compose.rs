@@ -53,21 +53,20 @@ impl Light {
     pub(super) fn make_up<T: Texel>(
         &self,
         pool: &ThreadPool,
-        [full, low]: [&Plane<T>; 2],
+        pictures: [&Plane<T>; 2],
         to: &mut Plane<T>,
     ) {
-        for_each_row(
+        for_each_texel(
             pool,
+            pictures,
             to,
             #[inline(always)]
-            |y, row| {
-                for (texel, (full, low)) in row.iter_mut().zip(full.row(y).iter().zip(low.row(y))) {
-                    let (mut levels, low) = (full.channels(), low.channels());
-                    for channel in 0..3 {
-                        levels[channel] = self.level(channel, levels[channel], low[channel]);
-                    }
-                    *texel = T::of_channels(levels);
+            |texel, full, low| {
+                let (mut levels, low) = (full.channels(), low.channels());
+                for channel in 0..3 {
+                    levels[channel] = self.level(channel, levels[channel], low[channel]);
                 }
+                *texel = T::of_channels(levels);
             },
         );
     }
@@ -85,32 +84,30 @@ impl Light {
     pub(super) fn add_rest<T: Texel>(
         &self,
         pool: &ThreadPool,
-        [full, low]: [&Plane<T>; 2],
+        pictures: [&Plane<T>; 2],
         to: &mut Plane<T>,
     ) {
         let tables = self.channels.each_ref().map(Compensation::table);
         let lights = tables.map(|table| table.words()[0]);
-        for_each_row(
+        for_each_texel(
             pool,
+            pictures,
             to,
             #[inline(always)]
-            |y, row| {
-                for (texel, (full, low)) in row.iter_mut().zip(full.row(y).iter().zip(low.row(y))) {
-                    if full == low {
-                        continue;
-                    }
-                    let (mut levels, full, low) =
-                        (texel.channels(), full.channels(), low.channels());
-                    for (channel, lights) in lights.into_iter().enumerate() {
-                        let light = |level: u16| lights[usize::from(level)];
-                        let rest = rest([full[channel], low[channel]].map(light));
-                        if rest != 0 {
-                            let around = [low[channel], levels[channel]].map(light);
-                            levels[channel] = tables[channel].level(self.with_rest(around, rest));
-                        }
-                    }
-                    *texel = T::of_channels(levels);
+            |texel, full, low| {
+                if full == low {
+                    return;
                 }
+                let (mut levels, full, low) = (texel.channels(), full.channels(), low.channels());
+                for (channel, lights) in lights.into_iter().enumerate() {
+                    let light = |level: u16| lights[usize::from(level)];
+                    let rest = rest([full[channel], low[channel]].map(light));
+                    if rest != 0 {
+                        let around = [low[channel], levels[channel]].map(light);
+                        levels[channel] = tables[channel].level(self.with_rest(around, rest));
+                    }
+                }
+                *texel = T::of_channels(levels);
             },
         );
     }
@@ -125,6 +122,26 @@ impl Light {
         let light = i64::from(now) + ((rest * weight) >> 8);
         light.clamp(0, FULL_LIGHT.into()).cast_unsigned()
     }
+}
+
+/// Calls `work` with each texel of `to`, and those of a full picture and of what is left of it that
+/// lie there.
+fn for_each_texel<T: Texel>(
+    pool: &ThreadPool,
+    [full, low]: [&Plane<T>; 2],
+    to: &mut Plane<T>,
+    work: impl Fn(&mut T, T, T) + Sync,
+) {
+    for_each_row(
+        pool,
+        to,
+        #[inline(always)]
+        |y, row| {
+            for (texel, (full, low)) in row.iter_mut().zip(full.row(y).iter().zip(low.row(y))) {
+                work(texel, *full, *low);
+            }
+        },
+    );
 }
 
 /// (3) of the light of a full picture and of what is left of it, of [`FULL_LIGHT`].
