@@ -1,6 +1,7 @@
 //! The colours of the tool's pictures: dark ink on a light page, and hues that stay apart for
 //! readers who do not tell red from green.
 
+use foreframe_engine::trajectory::rung::Rung;
 use tiny_skia::Color;
 
 /// Red, green, blue, 8-bit sRGB.
@@ -37,6 +38,20 @@ pub const HUES: [Rgb; 7] = [
     [86, 180, 233],
     [120, 94, 60],
 ];
+
+/// Colour of what goes on by a model; None where it is held.
+#[must_use]
+pub const fn rung_color(rung: Rung) -> Option<Rgb> {
+    match rung {
+        Rung::Hold => None,
+        Rung::Global => Some(HUES[5]),
+        Rung::Linear => Some(HUES[0]),
+        Rung::Affine => Some(HUES[2]),
+        Rung::Quadratic => Some(HUES[4]),
+        Rung::World(_) => Some(HUES[1]),
+        Rung::Flow => Some(HUES[3]),
+    }
+}
 
 /// Opaque colour for tiny-skia.
 #[must_use]

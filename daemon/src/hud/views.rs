@@ -2,11 +2,10 @@
 
 use foreframe_engine::ColorPlane;
 use foreframe_engine::inspect::Inspection;
-use foreframe_engine::trajectory::rung::Rung;
 use tiny_skia::{ColorU8, Paint, PathBuilder, Pixmap, Stroke, Transform};
 
 use super::overlay::lay;
-use crate::draw::palette::{HUES, Rgb, opaque};
+use crate::draw::palette::{HUES, Rgb, opaque, rung_color};
 
 /// Pixels of the picture that one block of a view stands for, each way.
 const BLOCK: u32 = 4;
@@ -32,18 +31,9 @@ pub(super) fn motion(inspection: Inspection<'_>, picture: &mut ColorPlane) {
 
 /// The model that each block goes on by, each in its colour; none where it is held.
 pub(super) fn rungs(inspection: Inspection<'_>, picture: &mut ColorPlane) {
-    blocks(picture, |x, y| {
-        let color = match inspection.rung_at(x, y) {
-            Rung::Hold => return ColorU8::from_rgba(0, 0, 0, 0),
-            Rung::Global => HUES[5],
-            Rung::Linear => HUES[0],
-            Rung::Affine => HUES[2],
-            Rung::Quadratic => HUES[4],
-            Rung::World(_) => HUES[1],
-            Rung::Flow => HUES[3],
-        };
-        let [red, green, blue] = color;
-        ColorU8::from_rgba(red, green, blue, 255)
+    blocks(picture, |x, y| match rung_color(inspection.rung_at(x, y)) {
+        None => ColorU8::from_rgba(0, 0, 0, 0),
+        Some([red, green, blue]) => ColorU8::from_rgba(red, green, blue, 255),
     });
 }
 

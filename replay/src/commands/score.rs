@@ -73,7 +73,7 @@ pub struct Args {
     /// Chart of speed against accuracy, FILE.svg or FILE.png; may be given for each.
     #[arg(long, value_name = "FILE", value_parser = plot::parse_plot)]
     pub chart: Vec<PathBuf>,
-    /// Page with everything: chart, tables, error over time, pictures to flip through.
+    /// Page with everything: chart, tables, error over time, pictures and rung maps to flip through.
     #[arg(long, value_name = "OUT.html")]
     pub report: Option<PathBuf>,
 }

@@ -1,11 +1,26 @@
-//! Pictures kept for flipping through: a truth, and what each method showed instead.
+//! Pictures kept for flipping through: a truth, what each method showed instead, and by which
+//! models it went on.
 
 use foreframe_engine::Plane;
+use foreframe_engine::inspect::Inspection;
+use foreframe_engine::trajectory::camera_path::CameraOrder;
+use foreframe_engine::trajectory::rung::Rung;
 
 use super::picture::Srgb8;
 
 /// Widest picture that is kept, px. Wider ones are made smaller by a whole factor.
 pub const WIDEST: u32 = 400;
+
+/// The models, as maps of them count: a camera's order makes no other model.
+pub const RUNGS: [Rung; 7] = [
+    Rung::Hold,
+    Rung::Global,
+    Rung::Linear,
+    Rung::Affine,
+    Rung::Quadratic,
+    Rung::World(CameraOrder::Constant),
+    Rung::Flow,
+];
 
 /// One frame.
 #[derive(Clone, PartialEq, Debug)]
@@ -16,6 +31,8 @@ pub struct FlipFrame {
     pub truth: Srgb8,
     /// What each method showed, in the order of the report, as much smaller.
     pub shown: Vec<Srgb8>,
+    /// Where the key lay by each method, as [`rung_map`] has it.
+    pub rungs: Vec<Plane<u8>>,
 }
 
 /// By what a picture so wide is divided, per axis.
@@ -25,14 +42,37 @@ pub fn scale_of(width: u32) -> u32 {
 }
 
 impl FlipFrame {
-    /// Keeps the pictures of one frame.
-    pub fn new(frame: usize, truth: &Srgb8, shown: impl Iterator<Item = Srgb8>) -> Self {
-        Self {
-            frame,
-            truth: smaller(truth),
-            shown: shown.map(|picture| smaller(&picture)).collect(),
-        }
+    /// Keeps the pictures of one frame: the truth, and for each method what it showed and its map.
+    pub fn new(
+        frame: usize,
+        truth: &Srgb8,
+        shown: impl Iterator<Item = (Srgb8, Plane<u8>)>,
+    ) -> Self {
+        let (shown, rungs) = shown.map(|(picture, map)| (smaller(&picture), map)).unzip();
+        Self { frame, truth: smaller(truth), shown, rungs }
     }
+}
+
+/// By which of [`RUNGS`] each pixel of the newest key goes on, as much smaller as the pictures: the
+/// model in the middle of what a pixel stands for. `[width, height]` is the size of the key.
+#[must_use]
+pub fn rung_map(inspection: &Inspection<'_>, [width, height]: [u32; 2]) -> Plane<u8> {
+    let scale = scale_of(width);
+    let [columns, rows] = smaller_size([width, height]);
+    let middle = |index: u32| index * scale + scale / 2;
+    let at = |(x, y): (u32, u32)| {
+        let name = inspection.rung_at(middle(x), middle(y).min(height - 1)).name();
+        let index = RUNGS.iter().position(|rung| rung.name() == name);
+        index.expect("every rung is listed") as u8
+    };
+    let places = (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y)));
+    Plane::from_vec(columns, rows, places.map(at).collect())
+}
+
+/// Size of a picture divided by [`scale_of`].
+fn smaller_size([width, height]: [u32; 2]) -> [u32; 2] {
+    let scale = scale_of(width);
+    [width / scale, (height / scale).max(1)]
 }
 
 /// The picture divided by [`scale_of`]: each pixel is the mean of those that it stands for.
@@ -41,7 +81,7 @@ fn smaller(picture: &Srgb8) -> Srgb8 {
     if scale == 1 {
         return picture.clone();
     }
-    let (width, height) = (picture.width() / scale, (picture.height() / scale).max(1));
+    let [width, height] = smaller_size([picture.width(), picture.height()]);
     let places = (0..height).flat_map(|y| (0..width).map(move |x| (x * scale, y * scale)));
     let mean = |(left, top): (u32, u32)| {
         let mut sum = [0_u32; 3];

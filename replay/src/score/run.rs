@@ -22,7 +22,7 @@ use foreframed::sink::srgb::SrgbConverter;
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use super::flips::FlipFrame;
+use super::flips::{FlipFrame, rung_map};
 use super::picture::{Srgb8, to_srgb8};
 use super::report::{CaptureScore, MotionCounts};
 use super::retina::{Eye, closeness, gaze_of, reach};
@@ -118,7 +118,11 @@ pub fn score_recording(
         }
         let truths = truths_of_key;
         for (place, frame) in predicted.enumerate().filter(|(_, frame)| kept.contains(frame)) {
-            let shown = runs.iter().map(|run| to_srgb8(&run.outputs[place], &converter));
+            let size = [format.width, format.height];
+            let shown = runs.iter().map(|run| {
+                let seen = run.engine.inspect().expect("it has been given this key");
+                (to_srgb8(&run.outputs[place], &converter), rung_map(&seen, size))
+            });
             flips.push(FlipFrame::new(frame, truths[place].picture(), shown));
         }
         on_key();

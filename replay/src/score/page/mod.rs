@@ -1,21 +1,22 @@
 //! The report as one self-contained page: chart, tables, error over time, tile classes as columns
 //! after Falchetto et al. 2007 (figures 4.2 and 4.3), and a viewer to flip between truth, what was
-//! predicted, and the error.
+//! predicted, the error, and the models by which the key went on.
 
+use foreframe_engine::Plane;
 use serde::Serialize;
 
 use super::chart::chart;
-use super::flips::{FlipFrame, scale_of};
+use super::flips::{FlipFrame, RUNGS, scale_of};
 use super::picture::Srgb8;
 use super::report::{CaptureScore, MethodScore, Report};
 use crate::draw::Drawing;
-use crate::draw::palette::{Rgb, heat};
+use crate::draw::palette::{Rgb, heat, rung_color};
 use crate::html::{Page, png_url};
 use crate::pictures::{
     Across, Column, ColumnSheet, Line, Look, Panel, PictureError, Sheet, columns, small_multiples,
 };
 
-/// Pictures on a page, truths and predictions together: a few megabytes.
+/// Pictures on a page, truths and predictions together: a few megabytes. Maps are small.
 const MOST_PICTURES: usize = 96;
 /// Frames of one capture to flip through, at least and at most.
 const FRAMES: [usize; 2] = [2, 6];
@@ -40,6 +41,14 @@ struct Flips {
     captures: Vec<FlipCapture>,
     heat: Vec<[u8; 4]>,
     gain: u32,
+    rungs: Vec<Model>,
+}
+
+/// A model of how surfaces go on, and its colour in the map; none where they are held.
+#[derive(Serialize)]
+struct Model {
+    name: &'static str,
+    color: Option<Rgb>,
 }
 
 #[derive(Serialize)]
@@ -54,6 +63,7 @@ struct Flip {
     frame: usize,
     truth: String,
     shown: Vec<String>,
+    rungs: Vec<String>,
 }
 
 /// Writes the page of a report.
@@ -97,7 +107,9 @@ pub fn page(report: &Report) -> anyhow::Result<String> {
         let scales: Vec<_> = report.captures.iter().map(scale_note).collect();
         page.text(&format!(
             "{kept} of {all} predicted frames are here, evenly spread; the others are left out to \
-             keep the page small. {}. Errors are the largest of the three channels, times {ERROR_GAIN}.",
+             keep the page small. {}. Errors are the largest of the three channels, times {ERROR_GAIN}. \
+             The rung map lies over the truth in grey: by which model each part of the newest key \
+             goes on, in its place in the key.",
             scales.join("; ")
         ));
         page.markup(include_str!("viewer.html"));
@@ -256,10 +268,12 @@ fn flips(report: &Report) -> anyhow::Result<Flips> {
         };
         let flip = |flip: &FlipFrame| {
             let shown = flip.shown.iter().map(|shown| url(&difference(shown, &flip.truth)));
+            let rungs = flip.rungs.iter().map(|map| url(&as_grey(map)));
             Ok(Flip {
                 frame: flip.frame,
                 truth: url(&flip.truth)?,
                 shown: shown.collect::<anyhow::Result<_>>()?,
+                rungs: rungs.collect::<anyhow::Result<_>>()?,
             })
         };
         Ok(FlipCapture {
@@ -277,6 +291,7 @@ fn flips(report: &Report) -> anyhow::Result<Flips> {
         captures: with_frames.map(capture).collect::<anyhow::Result<_>>()?,
         heat: heat.collect(),
         gain: ERROR_GAIN,
+        rungs: RUNGS.map(|rung| Model { name: rung.name(), color: rung_color(rung) }).into(),
     })
 }
 
@@ -287,6 +302,12 @@ fn difference(shown: &Srgb8, truth: &Srgb8) -> Srgb8 {
     };
     let pixels = shown.data().iter().zip(truth.data()).map(pixel).collect();
     Srgb8::from_vec(truth.width(), truth.height(), pixels)
+}
+
+/// A map as a picture whose every channel is its number.
+fn as_grey(map: &Plane<u8>) -> Srgb8 {
+    let pixels = map.data().iter().map(|&number| [number; 3]).collect();
+    Srgb8::from_vec(map.width(), map.height(), pixels)
 }
 
 fn url(picture: &Srgb8) -> anyhow::Result<String> {

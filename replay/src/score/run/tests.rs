@@ -4,6 +4,7 @@ mod retina;
 
 use super::*;
 use crate::recording::memory::MemoryRecording;
+use crate::score::flips::RUNGS;
 use crate::score::metrics::{psnr_rgb_db, psnr_y_db};
 use crate::score::report::MethodScore;
 
@@ -216,6 +217,11 @@ fn a_kept_frame_has_the_truth_and_what_each_method_made_of_it() {
         assert_eq!(flip.shown.len(), 2);
         assert_eq!(flip.shown[1], flip.truth, "linear is exact here");
         assert_ne!(flip.shown[0], flip.truth);
+        let names = flip.rungs.iter().map(|map| {
+            assert_eq!([map.width(), map.height()], [flip.truth.width(), flip.truth.height()]);
+            RUNGS[usize::from(map.at(30, 24))].name()
+        });
+        assert!(names.eq(["hold", "linear"]));
     }
     let by_frame = &capture.methods[0].by_frame;
     assert_eq!(by_frame.iter().map(|point| point.frame).collect::<Vec<_>>(), [1, 2, 3, 5, 6, 7]);
