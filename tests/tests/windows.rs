@@ -8,9 +8,10 @@ use std::fs;
 use std::path::PathBuf;
 
 use compositors::{Compositor, Kind};
-use daemon_fixture::child::{ChildProcess, run_if_asked};
+use daemon_fixture::child::{BACKEND, ChildProcess, run_if_asked};
 use daemon_fixture::{Client, KeySource, private_folder};
 use foreframe_engine::MonoSpan;
+use foreframe_engine::backend::gpu::test_adapters::test_adapters;
 use foreframe_protocol::{DaemonMessage, DestroyStream, Presented};
 use foreframed::clock;
 use tempfile::TempDir;
@@ -36,7 +37,14 @@ struct Stage {
 
 impl Stage {
     fn set(kind: Kind, hz: u32) -> Option<Self> {
-        let compositor = Compositor::start(kind, MONITOR, hz)?;
+        Self::set_with(kind, hz, None)
+    }
+
+    /// The same on a GPU adapter.
+    fn set_with(kind: Kind, hz: u32, backend: Option<&str>) -> Option<Self> {
+        let mut compositor = Compositor::start(kind, MONITOR, hz)?;
+        let backend = backend.map(|name| (BACKEND, name.to_owned()));
+        compositor.environment.extend(backend);
         let folder = private_folder();
         let [socket, log] = ["daemon.sock", "log"].map(|name| folder.path().join(name));
         let daemon = ChildProcess::daemon_with_windows(&socket, &compositor.environment, &log);
@@ -100,6 +108,7 @@ fn on_mutter(hz: u32) {
     let shown = stage.show(40);
     assert_told_by_the_display(&shown);
     let log = stage.log();
+    assert!(log.contains("way=\"wl_shm: the CPU makes the pictures\""), "{log}");
     assert!(log.contains("pacing=\"presentation feedback\""), "{log}");
     assert!(!log.contains("another pacing"), "{log}");
     let interval = stage.client.expect("pacing", |message| match message {
@@ -151,6 +160,61 @@ fn on_x11_frames_are_paced_by_a_timer_and_that_is_said() {
     stage.show(40);
     let log = stage.log();
     assert!(log.contains("pacing=\"timer\""), "{log}");
+    stage.strike();
+}
+
+/// The adapter that presents without a GPU, as a backend; None, and a word of it, where it is not
+/// installed.
+fn lavapipe() -> Option<&'static str> {
+    let name = std::thread::current().name().unwrap_or_default().to_owned();
+    let found = test_adapters(&name).iter().any(|it| it.facts.name.contains("llvmpipe"));
+    if !found {
+        eprintln!("skipped (1): {name}: no llvmpipe");
+    }
+    found.then_some("gpu:llvmpipe")
+}
+
+/// Shows keys through a surface, which stays the way.
+fn on_a_surface(kind: Kind, hz: u32, pacing: &str) {
+    let Some(backend) = lavapipe() else { return };
+    let Some(mut stage) = Stage::set_with(kind, hz, Some(backend)) else { return };
+    stage.show_until_logged(&format!("pacing=\"{pacing}\""));
+    stage.show(40);
+    stage.strike();
+    let log = stage.log();
+    assert!(log.contains("way=\"a surface of llvmpipe"), "{log}");
+    assert!(!log.contains("another way") && !log.contains("from now on"), "{log}");
+}
+
+#[test]
+fn on_mutter_a_surface_is_paced_by_presentation_feedback() {
+    on_a_surface(Kind::Mutter, 60, "presentation feedback");
+}
+
+#[test]
+fn on_weston_a_surface_is_paced_by_presentation_feedback() {
+    on_a_surface(Kind::Weston, 60, "presentation feedback");
+}
+
+#[test]
+fn on_sway_a_surface_is_paced_by_frame_callbacks() {
+    on_a_surface(Kind::Sway, 120, "frame callbacks");
+}
+
+#[test]
+fn on_x11_a_surface_is_paced_by_a_timer() {
+    on_a_surface(Kind::Xvfb, 60, "timer");
+}
+
+#[test]
+fn a_surface_that_loses_its_compositor_ends_the_window_and_nothing_else() {
+    let Some(backend) = lavapipe() else { return };
+    let Some(mut stage) = Stage::set_with(Kind::Mutter, 60, Some(backend)) else { return };
+    stage.show(5);
+    stage.compositor.kill();
+    stage.show_until_logged("window closes");
+    stage.client.take_waiting();
+    stage.client.submit(&mut stage.source, [7, 7, 7, 255]);
     stage.strike();
 }
 

@@ -46,6 +46,9 @@ pub struct StreamStatus {
     pub backend: String,
     /// What says when its frames are shown: `timer`, `presentation feedback`, `frame callbacks`.
     pub paced_by: String,
+    /// How pictures get into its window, and why not otherwise; empty without a window.
+    #[serde(default)]
+    pub drawn_by: String,
     /// Name of the display profile that it is for; None where nobody named one.
     #[serde(default)]
     pub display: Option<String>,

@@ -15,19 +15,57 @@ use half::f16;
 /// Luminance of diffuse white of a PQ stream that does not state it, in cd/m2.
 const DEFAULT_PQ_WHITE: f32 = 203.0;
 
-/// Rows: red, green and blue of BT.709 from those of BT.2020 (ITU-R BT.2087-0, 2015, inverse).
-const BT709_FROM_BT2020: [[f32; 3]; 3] = [
+/// Rows: red, green and blue of some primaries from those of others.
+pub(crate) type Matrix = [[f32; 3]; 3];
+
+/// BT.709 from BT.2020 (ITU-R BT.2087-0, 2015, inverse).
+const BT709_FROM_BT2020: Matrix = [
     [1.660_491, -0.587_641_1, -0.072_849_9],
     [-0.124_550_5, 1.132_899_9, -0.008_349_4],
     [-0.018_150_8, -0.100_578_9, 1.118_729_7],
 ];
 
-/// Rows: red, green and blue of BT.709 from those of Display P3 (SMPTE EG 432-1, D65 white).
-const BT709_FROM_DISPLAY_P3: [[f32; 3]; 3] = [
+/// BT.2020 from BT.709 (ITU-R BT.2087-0, 2015).
+const BT2020_FROM_BT709: Matrix = [
+    [0.627_404, 0.329_283, 0.043_313],
+    [0.069_097, 0.919_54, 0.011_362],
+    [0.016_391, 0.088_013, 0.895_595],
+];
+
+/// BT.709 from Display P3 (SMPTE EG 432-1, D65 white).
+const BT709_FROM_DISPLAY_P3: Matrix = [
     [1.224_940_2, -0.224_940_2, 0.0],
     [-0.042_057, 1.042_057, 0.0],
     [-0.019_637_6, -0.078_636_1, 1.098_273_6],
 ];
+
+const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+/// BT.709 from these.
+pub(crate) const fn bt709_from(primaries: Primaries) -> Matrix {
+    match primaries {
+        Primaries::Bt709 => IDENTITY,
+        Primaries::Bt2020 => BT709_FROM_BT2020,
+        Primaries::DisplayP3 => BT709_FROM_DISPLAY_P3,
+    }
+}
+
+/// BT.2020 from these.
+pub(crate) fn bt2020_from(primaries: Primaries) -> Matrix {
+    let first = match primaries {
+        Primaries::Bt2020 => return IDENTITY,
+        Primaries::Bt709 => IDENTITY,
+        Primaries::DisplayP3 => BT709_FROM_DISPLAY_P3,
+    };
+    let column = |at: usize| first.map(|row| row[at]);
+    let product = |row: [f32; 3], at| row.iter().zip(column(at)).map(|(a, b)| a * b).sum();
+    BT2020_FROM_BT709.map(|row| [0, 1, 2].map(|at| product(row, at)))
+}
+
+/// Luminance of 1, in cd/m2.
+pub(crate) fn white(format: &StreamFormat) -> f32 {
+    if format.white_cd_m2 > 0.0 { format.white_cd_m2 } else { DEFAULT_PQ_WHITE }
+}
 
 /// Converts the frames of one stream.
 #[derive(Debug)]
@@ -51,7 +89,7 @@ impl SrgbConverter {
                 .map(|ordered| f16::from_bits(ordered_to_half(ordered)).to_f32())
                 .collect(),
         };
-        let white = if format.white_cd_m2 > 0.0 { format.white_cd_m2 } else { DEFAULT_PQ_WHITE };
+        let white = white(format);
         let linear: Vec<f32> = codes
             .into_iter()
             .map(|code| {
@@ -92,15 +130,12 @@ impl SrgbConverter {
     }
 
     fn extend<T: Copy>(&self, out: &mut Vec<u8>, texels: &[T], codes: impl Fn(T) -> [usize; 3]) {
-        let matrix = match self.primaries {
-            Primaries::Bt709 => {
-                let direct = &self.direct;
-                out.extend(texels.iter().flat_map(|&texel| codes(texel).map(|code| direct[code])));
-                return;
-            }
-            Primaries::Bt2020 => &BT709_FROM_BT2020,
-            Primaries::DisplayP3 => &BT709_FROM_DISPLAY_P3,
-        };
+        if self.primaries == Primaries::Bt709 {
+            let direct = &self.direct;
+            out.extend(texels.iter().flat_map(|&texel| codes(texel).map(|code| direct[code])));
+            return;
+        }
+        let matrix = bt709_from(self.primaries);
         out.extend(texels.iter().flat_map(|&texel| {
             let light = codes(texel).map(|code| self.linear[code]);
             matrix.map(|row| {
@@ -208,6 +243,20 @@ mod tests {
         // 1 % of white is sRGB code 25.5.
         let [red, green, blue] = convert_one(&format, &frame);
         assert!((25..=26).contains(&red) && red == green && green == blue, "{red}");
+    }
+
+    #[test]
+    fn primaries_there_and_back_are_the_same() {
+        for (at, row) in bt2020_from(Primaries::Bt709).iter().enumerate() {
+            for column in 0..3 {
+                let product: f32 = (0..3).map(|k| row[k] * BT709_FROM_BT2020[k][column]).sum();
+                let expected = if at == column { 1.0 } else { 0.0 };
+                assert!((product - expected).abs() < 1e-4, "{at} {column}: {product}");
+            }
+        }
+        let through = bt2020_from(Primaries::DisplayP3);
+        assert!((through[0][0] - 0.753_83).abs() < 1e-3, "{through:?}");
+        assert!((through[1][1] - 0.941_78).abs() < 1e-3, "{through:?}");
     }
 
     #[test]

@@ -1,7 +1,9 @@
 //! The window of a stream as its thread has it: pictures to it, and its word to the core.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
+use foreframe_engine::backend::gpu::Gpu;
 use foreframe_engine::pacing::Plan;
 use foreframe_engine::{ColorPlane, MonoTime};
 use foreframe_protocol::Presented;
@@ -37,11 +39,12 @@ impl WindowDisplay {
     pub(super) fn open(
         opener: &WindowOpener,
         config: &WindowConfig,
+        gpu: Option<&Arc<Gpu>>,
         view: HudView,
         core: &mut StreamCore,
         wake: impl Fn() + Send + Sync + 'static,
     ) -> Option<Self> {
-        let window = Window::open(opener, config, wake)
+        let window = Window::open(opener, config, gpu, wake)
             .inspect_err(|error| warn!(%error, "no window; pictures go to subscribers alone"))
             .ok()?;
         let feedback = window.feedback();
@@ -107,6 +110,7 @@ impl WindowDisplay {
     /// Adds to a report what the window knows, and shows it in the HUD.
     pub(super) fn report(&mut self, report: &mut StreamStatus) {
         self.feedback.name().clone_into(&mut report.paced_by);
+        self.window.way().clone_into(&mut report.drawn_by);
         if self.feedback != Feedback::Presentation {
             report.warnings.push(format!("the display is paced by {}", self.feedback.name()));
         }

@@ -145,18 +145,20 @@ impl StreamThread {
         let format = ingest::stream_format(&parts.create.format);
         // Before real-time priority is asked for: the engine's workers must not inherit it.
         let mut core = StreamCore::new(format, &parts.core);
-        if let Some((gpus, index)) = &parts.gpu {
-            match gpus.open(*index) {
-                Ok(gpu) => core.use_gpu(&gpu),
-                Err(error) => warn!(%error, "the CPU makes the pictures"),
-            }
+        let gpu = parts.gpu.as_ref().and_then(|(gpus, index)| {
+            let opened = gpus.open(*index);
+            opened.inspect_err(|error| warn!(%error, "the CPU makes the pictures")).ok()
+        });
+        if let Some(gpu) = &gpu {
+            core.use_gpu(gpu);
         }
         let size = [parts.create.format.width, parts.create.format.height];
         let hints = Hints::new(size, parts.core.engine.pixels_per_degree);
         info!(stream = parts.ordinal, backend = core.backend().name, "stream starts");
         let window = parts.window.as_ref().and_then(|(opener, config)| {
             let mailbox = Arc::clone(&parts.mailbox);
-            WindowDisplay::open(opener, config, parts.hud, &mut core, move || mailbox.waker.wake())
+            let wake = move || mailbox.waker.wake();
+            WindowDisplay::open(opener, config, gpu.as_ref(), parts.hud, &mut core, wake)
         });
         Self {
             parts,

@@ -100,6 +100,9 @@ fn stream_text(stream: &StreamStatus) -> String {
         "\n  since the start: {received} keys ({superseded} superseded, {refused} refused); \
          {real} real, {synthesised} synthesised, {repeated} repeated, {dropped} dropped"
     );
+    if !stream.drawn_by.is_empty() {
+        let _infallible = write!(out, "\n  its window is drawn by {}", stream.drawn_by);
+    }
     if !stream.models_percent.is_empty() {
         let _infallible = write!(out, "\n  models: {}", models(stream));
     }

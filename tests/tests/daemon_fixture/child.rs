@@ -18,9 +18,10 @@ const ROLE: &str = "FOREFRAME_TEST_ROLE";
 const SOCKET: &str = "FOREFRAME_TEST_SOCKET";
 const RECORD: &str = "FOREFRAME_TEST_RECORD";
 const SINK: &str = "FOREFRAME_TEST_SINK";
-/// `--monitor NAME` or `--layout NAME`, if it is to have one of them.
+/// `--monitor NAME`, `--layout NAME` or `--backend NAME`, if it is to have one of them.
 pub(crate) const MONITOR: &str = "FOREFRAME_TEST_MONITOR";
 pub(crate) const LAYOUT: &str = "FOREFRAME_TEST_LAYOUT";
+pub(crate) const BACKEND: &str = "FOREFRAME_TEST_BACKEND";
 const REFRESH: &str = "FOREFRAME_TEST_REFRESH";
 /// What a daemon with windows logs.
 const LOG: &str = "info,foreframed::stream::display=trace";
@@ -70,6 +71,7 @@ pub(crate) fn run_if_asked() {
                 refresh,
                 monitor: std::env::var(MONITOR).ok(),
                 layout: std::env::var(LAYOUT).ok().map(|layout| layout.parse().unwrap()),
+                backend: std::env::var(BACKEND).ok().map(|backend| backend.parse().unwrap()),
                 ..Args::default()
             };
             match foreframed::run(args) {

@@ -8,6 +8,7 @@
 #![expect(clippy::unwrap_used, reason = "a fixture that cannot go on fails its test")]
 
 mod objects;
+pub(crate) mod stage;
 
 use std::collections::HashMap;
 use std::fs::File;

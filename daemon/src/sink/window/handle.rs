@@ -1,20 +1,27 @@
 //! One window, as its stream has it.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
-use foreframe_engine::{ColorPlane, MonoSpan, MonoTime};
+use foreframe_engine::backend::gpu::Gpu;
+use foreframe_engine::{ColorPlane, MonoSpan, MonoTime, StreamFormat};
+use tracing::{info, warn};
 use winit::window::WindowId;
 
 use super::shared::Shared;
 use super::software::Painter;
+use super::surface::{Canvas, GpuSurface, SurfaceError};
 use super::system::{Opened, WindowOpener};
-use super::wayland::{Guest, WaylandSurface};
+use super::wayland::{Face, Guest, WaylandSurface};
 use super::{Feedback, WindowConfig, WindowError, WindowEvent};
 
 /// An open window. Closed when dropped.
 #[derive(Debug)]
 pub struct Window {
     surface: Surface,
+    /// How pictures get into it, for people.
+    way: String,
+    canvas: Canvas,
+    format: StreamFormat,
     shared: Arc<Shared>,
     refresh_interval: Option<MonoSpan>,
     id: WindowId,
@@ -24,32 +31,65 @@ pub struct Window {
 /// How pictures get into it.
 #[derive(Debug)]
 enum Surface {
-    Wayland(Box<WaylandSurface>),
+    Gpu(GpuSurface),
+    Wayland(WaylandSurface),
     Software(Painter),
+    /// Not at all.
+    None,
+}
+
+impl Surface {
+    /// One that the CPU draws on.
+    fn by_the_cpu(
+        canvas: &Canvas,
+        format: &StreamFormat,
+        shared: &Arc<Shared>,
+    ) -> Result<Self, WindowError> {
+        match canvas {
+            Canvas::Wayland(face) => {
+                Ok(Self::Wayland(WaylandSurface::new(Arc::clone(face), format)))
+            }
+            Canvas::Other { window, display } => {
+                let (window, display) = (Arc::clone(window), display.clone());
+                Painter::start(window, display, format, Arc::clone(shared)).map(Self::Software)
+            }
+        }
+    }
+
+    /// Its name, for people.
+    fn name(&self) -> &str {
+        match self {
+            Self::Gpu(surface) => &surface.name,
+            Self::Wayland(_) => "wl_shm",
+            Self::Software(_) => "softbuffer",
+            Self::None => "nothing",
+        }
+    }
 }
 
 impl Window {
-    /// Opens a window. `wake` is called on other threads when there are events to take; it must
-    /// not block.
+    /// Opens a window, drawn by `gpu` where there is one that can. `wake` is called on other
+    /// threads when there are events to take; it must not block.
     ///
     /// # Errors
     /// If the display is gone, does not answer in time, or lacks what a window needs.
     pub fn open(
         opener: &WindowOpener,
         config: &WindowConfig,
+        gpu: Option<&Arc<Gpu>>,
         wake: impl Fn() + Send + Sync + 'static,
     ) -> Result<Self, WindowError> {
         let shared = Arc::new(Shared::new(wake));
-        let Opened { window, display, refresh_interval, role } = opener.open(config, &shared)?;
-        let id = window.id();
-        let surface = match Guest::join(&window, &display) {
-            Some(guest) => WaylandSurface::new(guest, &config.format, Arc::clone(&shared), role)
-                .map(|surface| Surface::Wayland(Box::new(surface))),
-            None => Painter::start(window, display, &config.format, Arc::clone(&shared))
-                .map(Surface::Software),
-        };
-        let surface = surface.inspect_err(|_| opener.close(id, &shared))?;
-        Ok(Self { surface, shared, refresh_interval, id, opener: opener.clone() })
+        let opened = opener.open(config, &shared)?;
+        let (id, refresh_interval) = (opened.window.id(), opened.refresh_interval);
+        let drawn = canvas(opened, &shared).and_then(|canvas| {
+            let (surface, way) = draw_on(&canvas, &config.format, gpu, &shared)?;
+            Ok((canvas, surface, way))
+        });
+        let (canvas, surface, way) = drawn.inspect_err(|_| opener.close(id, &shared))?;
+        let format = config.format;
+        let opener = opener.clone();
+        Ok(Self { surface, way, canvas, format, shared, refresh_interval, id, opener })
     }
 
     /// Refresh interval that its monitor announces, if it announces one.
@@ -58,12 +98,18 @@ impl Window {
         self.refresh_interval
     }
 
+    /// How pictures get into it, and why not otherwise. For people.
+    #[must_use]
+    pub fn way(&self) -> &str {
+        &self.way
+    }
+
     /// Where it knows from when its frames were shown.
     #[must_use]
     pub fn feedback(&self) -> Feedback {
-        match &self.surface {
-            Surface::Wayland(surface) => surface.feedback(),
-            Surface::Software(_) => Feedback::Timer,
+        match &self.canvas {
+            Canvas::Wayland(face) => face.lock().unwrap_or_else(PoisonError::into_inner).feedback(),
+            Canvas::Other { .. } => Feedback::Timer,
         }
     }
 
@@ -73,10 +119,29 @@ impl Window {
         if self.shared.is_closed() {
             return false;
         }
+        if let Surface::Gpu(surface) = &self.surface {
+            match surface.present(planned, frame) {
+                Ok(()) => return true,
+                Err(why) => self.leave_the_gpu(&why),
+            }
+        }
         match &mut self.surface {
             Surface::Wayland(surface) => surface.present(planned, frame),
             Surface::Software(painter) => painter.present(frame),
+            Surface::Gpu(_) | Surface::None => false,
         }
+    }
+
+    /// The CPU draws from now on.
+    fn leave_the_gpu(&mut self, why: &SurfaceError) {
+        // The surface goes before somebody else draws there.
+        self.surface = Surface::None;
+        match Surface::by_the_cpu(&self.canvas, &self.format, &self.shared) {
+            Ok(surface) => self.surface = surface,
+            Err(error) => warn!(%error, "the window stays as it is"),
+        }
+        self.way = format!("{}: {why}", self.surface.name());
+        warn!(way = self.surface.name(), %why, "another way into the window");
     }
 
     /// What happened since the last call, in order.
@@ -90,4 +155,41 @@ impl Drop for Window {
     fn drop(&mut self) {
         self.opener.close(self.id, &self.shared);
     }
+}
+
+/// Where the pictures of a window go.
+fn canvas(opened: Opened, shared: &Arc<Shared>) -> Result<Canvas, WindowError> {
+    let Opened { window, display, role, .. } = opened;
+    match Guest::join(&window, &display) {
+        Some(guest) => {
+            let face = Face::new(guest, Arc::clone(shared), role)?;
+            Ok(Canvas::Wayland(Arc::new(Mutex::new(face))))
+        }
+        None => Ok(Canvas::Other { window, display }),
+    }
+}
+
+/// What draws there, and that in words.
+fn draw_on(
+    canvas: &Canvas,
+    format: &StreamFormat,
+    gpu: Option<&Arc<Gpu>>,
+    shared: &Arc<Shared>,
+) -> Result<(Surface, String), WindowError> {
+    let made = gpu.ok_or(SurfaceError::NoGpu);
+    let made = made.and_then(|gpu| GpuSurface::start(gpu, canvas.clone(), format, shared));
+    let (surface, way) = match made {
+        Ok(surface) => {
+            let way = surface.name.clone();
+            (Surface::Gpu(surface), way)
+        }
+        Err(SurfaceError::NoAnswer) => return Err(WindowError::NoAnswer("none in 5 s")),
+        Err(why) => {
+            let surface = Surface::by_the_cpu(canvas, format, shared)?;
+            let way = format!("{}: {why}", surface.name());
+            (surface, way)
+        }
+    };
+    info!(way, "window is drawn");
+    Ok((surface, way))
 }

@@ -13,11 +13,13 @@
 //! timer at the announced rate. A display that is gone leaves the daemon and its streams as they
 //! are.
 
+mod easel;
 mod handle;
 mod host;
 mod placement;
 mod shared;
 mod software;
+mod surface;
 mod system;
 mod texels;
 mod wayland;

@@ -1,10 +1,9 @@
 //! Pictures for displays without Wayland: a thread scales and paints them.
 //!
-//! Painting may wait for the display, so the stream leaves its picture in a place for one and goes
-//! on; what the painter did not get to is replaced by the next. Nothing tells when it was shown.
+//! The stream leaves its picture on an [`Easel`] and goes on. Nothing tells when it was shown.
 
 use std::num::NonZeroU32;
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::sync::Arc;
 use std::thread;
 
 use foreframe_engine::{ColorPlane, Rect, StreamFormat};
@@ -13,6 +12,7 @@ use tracing::warn;
 use winit::event_loop::OwnedDisplayHandle;
 use winit::window::Window as DesktopWindow;
 
+use super::easel::Easel;
 use super::placement::Placement;
 use super::shared::Shared;
 use super::texels::{ByteOrder, Picture, Texels};
@@ -21,22 +21,7 @@ use super::{Closed, WindowError};
 /// Paints a window. Its thread ends when this is dropped and the display lets it.
 #[derive(Debug)]
 pub(super) struct Painter {
-    easel: Arc<Easel>,
-}
-
-/// The place for one picture.
-#[derive(Debug, Default)]
-struct Easel {
-    state: Mutex<State>,
-    changed: Condvar,
-}
-
-#[derive(Debug, Default)]
-struct State {
-    next: Option<ColorPlane>,
-    /// A picture that was painted, for its memory.
-    spare: Option<ColorPlane>,
-    is_over: bool,
+    easel: Arc<Easel<()>>,
 }
 
 impl Painter {
@@ -59,40 +44,15 @@ impl Painter {
 
     /// Leaves `frame` for the painter.
     pub(super) fn present(&self, frame: &ColorPlane) -> bool {
-        let mut state = self.easel.state.lock().unwrap_or_else(PoisonError::into_inner);
-        match state.next.take().or_else(|| state.spare.take()) {
-            Some(mut place) => {
-                place.copy_from(frame);
-                state.next = Some(place);
-            }
-            None => state.next = Some(frame.clone()),
-        }
-        self.easel.changed.notify_one();
+        // Nobody waits for word of the picture that it may replace.
+        let _replaced = self.easel.leave((), frame);
         true
     }
 }
 
 impl Drop for Painter {
     fn drop(&mut self) {
-        self.easel.state.lock().unwrap_or_else(PoisonError::into_inner).is_over = true;
-        self.easel.changed.notify_one();
-    }
-}
-
-impl Easel {
-    /// Waits for the next picture; None when there will be none.
-    fn take(&self, painted: Option<ColorPlane>) -> Option<ColorPlane> {
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        state.spare = painted;
-        loop {
-            if state.is_over {
-                return None;
-            }
-            if let Some(next) = state.next.take() {
-                return Some(next);
-            }
-            state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
-        }
+        self.easel.close();
     }
 }
 
@@ -100,14 +60,14 @@ fn paint_all(
     window: Arc<DesktopWindow>,
     display: OwnedDisplayHandle,
     format: &StreamFormat,
-    easel: &Easel,
+    easel: &Easel<()>,
     shared: &Shared,
 ) -> Result<(), SoftBufferError> {
     let context = Context::new(display)?;
     let mut surface = Surface::new(&context, window)?;
     let mut texels = Texels::new(format, ByteOrder::Bgrx);
     let (mut painted, mut row) = (None, Vec::new());
-    while let Some(frame) = easel.take(painted.take()) {
+    while let Some(((), frame)) = easel.take(painted.take()) {
         let placement = Placement::scaled([frame.width(), frame.height()], shared.size());
         let [width, height] =
             placement.buffer.map(|length| NonZeroU32::new(length).expect("a side is at least 1"));

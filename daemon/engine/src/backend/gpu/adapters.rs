@@ -13,6 +13,7 @@ pub struct GpuAdapter {
     /// What is known of it.
     pub facts: AdapterFacts,
     pub(super) adapter: wgpu::Adapter,
+    pub(super) instance: wgpu::Instance,
 }
 
 /// Every GPU adapter that a driver offers, in the order of the drivers. None without a driver.
@@ -26,11 +27,11 @@ pub fn adapters() -> Vec<GpuAdapter> {
     };
     let instance = wgpu::Instance::new(descriptor);
     let found = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::VULKAN));
-    found.into_iter().map(GpuAdapter::new).collect()
+    found.into_iter().map(|adapter| GpuAdapter::new(&instance, adapter)).collect()
 }
 
 impl GpuAdapter {
-    fn new(adapter: wgpu::Adapter) -> Self {
+    fn new(instance: &wgpu::Instance, adapter: wgpu::Adapter) -> Self {
         let info = adapter.get_info();
         let kind = match info.device_type {
             wgpu::DeviceType::DiscreteGpu => AdapterKind::Discrete,
@@ -48,16 +49,17 @@ impl GpuAdapter {
             binding_limit: adapter.limits().max_storage_buffer_binding_size,
             unusable: unusable(&adapter),
         };
-        Self { facts, adapter }
+        Self { facts, adapter, instance: instance.clone() }
     }
 
-    /// What a device is opened with: what the kernels need, and planes as large as the adapter
-    /// takes.
+    /// What a device is opened with: what the kernels need, and planes and windows as large as the
+    /// adapter takes.
     pub(super) fn limits(&self) -> wgpu::Limits {
         let offered = self.adapter.limits();
         wgpu::Limits {
             max_storage_buffer_binding_size: offered.max_storage_buffer_binding_size,
             max_buffer_size: offered.max_buffer_size,
+            max_texture_dimension_2d: offered.max_texture_dimension_2d,
             ..needed()
         }
     }

@@ -23,6 +23,8 @@ const LAST_WORDS: Duration = Duration::from_secs(1);
 #[derive(Debug)]
 pub struct Gpu {
     name: String,
+    instance: wgpu::Instance,
+    adapter: wgpu::Adapter,
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
     /// The first thing that went wrong outside of any call.
@@ -70,7 +72,15 @@ impl Gpu {
             let why = format!("{reason:?} {message}").trim_end().to_owned();
             note(&kept, GpuError::Lost { why });
         });
-        Ok(Arc::new(Self { name, device, queue, fault, shaders: Mutex::default() }))
+        Ok(Arc::new(Self {
+            name,
+            instance: adapter.instance.clone(),
+            adapter: adapter.adapter.clone(),
+            device,
+            queue,
+            fault,
+            shaders: Mutex::default(),
+        }))
     }
 
     /// Name of the adapter.
@@ -85,6 +95,30 @@ impl Gpu {
         self.fault().is_some()
     }
 
+    /// What surfaces that this device is to draw on are made with.
+    #[must_use]
+    pub fn instance(&self) -> &wgpu::Instance {
+        &self.instance
+    }
+
+    /// What says how this device can draw on a surface.
+    #[must_use]
+    pub fn adapter(&self) -> &wgpu::Adapter {
+        &self.adapter
+    }
+
+    /// The device itself. Calls that can fail go through [`Gpu::guard`].
+    #[must_use]
+    pub fn device(&self) -> &wgpu::Device {
+        &self.device
+    }
+
+    /// Its queue, which all streams share.
+    #[must_use]
+    pub fn queue(&self) -> &wgpu::Queue {
+        &self.queue
+    }
+
     fn fault(&self) -> Option<GpuError> {
         self.fault.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
@@ -95,10 +129,10 @@ impl Gpu {
     }
 
     /// Runs `calls` and reports what the device had to say about them, or before.
-    pub(super) fn guard<T>(
-        &self,
-        calls: impl FnOnce() -> Result<T, GpuError>,
-    ) -> Result<T, GpuError> {
+    ///
+    /// # Errors
+    /// If they fail, the device refused one of them, or it is lost.
+    pub fn guard<T>(&self, calls: impl FnOnce() -> Result<T, GpuError>) -> Result<T, GpuError> {
         let filters = [
             wgpu::ErrorFilter::Internal,
             wgpu::ErrorFilter::OutOfMemory,

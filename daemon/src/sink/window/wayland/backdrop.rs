@@ -3,7 +3,7 @@
 //! A window is shown once its own surface has a picture, and the surfaces inside it with it. This
 //! one never changes but with the window's size.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use foreframe_engine::{ColorPlane, MonoTime, StreamFormat};
 use winit::dpi::PhysicalSize;
@@ -11,6 +11,7 @@ use winit::event_loop::OwnedDisplayHandle;
 use winit::window::Window as DesktopWindow;
 
 use super::cell::Role;
+use super::face::Face;
 use super::guest::Guest;
 use super::surface::WaylandSurface;
 use crate::sink::window::WindowError;
@@ -36,7 +37,8 @@ impl Backdrop {
         // Nobody waits for what happens to it.
         let shared = Arc::new(Shared::new(|| {}));
         let format = StreamFormat::rgba8(1, 1);
-        let surface = WaylandSurface::new(guest, &format, Arc::clone(&shared), Role::Behind)?;
+        let face = Face::new(guest, Arc::clone(&shared), Role::Behind)?;
+        let surface = WaylandSurface::new(Arc::new(Mutex::new(face)), &format);
         Ok(Self { surface, shared, black: ColorPlane::new(format.color, 1, 1) })
     }
 

@@ -3,12 +3,16 @@
 //! Frames have to go to the surface that winit has made, which only pointers lead to. What keeps
 //! them valid is held here, in the order in which it has to go: our connection before the window,
 //! and the window before the display. A queue of a display that is gone would be a crash.
+//!
+//! Graphics drivers want such pointers, too: [`Target`] lends them.
 
 use std::fmt;
+use std::ptr::NonNull;
 use std::sync::Arc;
 
 use raw_window_handle::{
-    HasDisplayHandle as _, HasWindowHandle as _, RawDisplayHandle, RawWindowHandle,
+    DisplayHandle, HandleError, HasDisplayHandle, HasWindowHandle, RawDisplayHandle,
+    RawWindowHandle, WaylandWindowHandle, WindowHandle,
 };
 use tracing::warn;
 use wayland_backend::client::{Backend, ObjectId};
@@ -20,7 +24,7 @@ use winit::window::Window as DesktopWindow;
 /// Our connection and the window's surface on it. Whoever has a queue of it drops that first.
 pub(super) struct Anchor {
     _window: Arc<DesktopWindow>,
-    _display: OwnedDisplayHandle,
+    display: OwnedDisplayHandle,
 }
 
 /// A second connection to a display that is already connected.
@@ -29,6 +33,37 @@ pub(in crate::sink::window) struct Guest {
     pub(super) connection: Connection,
     /// Dropped after the two above.
     pub(super) anchor: Anchor,
+}
+
+/// A surface of the window as graphics drivers are given it.
+pub(in crate::sink::window) struct Target {
+    surface: WlSurface,
+    anchor: Arc<Anchor>,
+}
+
+impl Target {
+    /// `anchor` is that of the connection that `surface` is on.
+    pub(super) fn new(surface: &WlSurface, anchor: &Arc<Anchor>) -> Self {
+        Self { surface: surface.clone(), anchor: Arc::clone(anchor) }
+    }
+}
+
+impl HasDisplayHandle for Target {
+    fn display_handle(&self) -> Result<DisplayHandle<'_>, HandleError> {
+        self.anchor.display.display_handle()
+    }
+}
+
+impl HasWindowHandle for Target {
+    fn window_handle(&self) -> Result<WindowHandle<'_>, HandleError> {
+        let pointer = NonNull::new(self.surface.id().as_ptr()).ok_or(HandleError::Unavailable)?;
+        let raw = RawWindowHandle::Wayland(WaylandWindowHandle::new(pointer.cast()));
+        // SAFETY: the pointer is a `wl_surface` that was alive a moment ago, by the mark that it
+        // shares with whoever destroys it. The window's own lives as long as `anchor`; one inside
+        // the window is destroyed by the `Face` that it belongs to, which whoever draws on it
+        // keeps, and drops after what it draws with.
+        Ok(unsafe { WindowHandle::borrow_raw(raw) })
+    }
 }
 
 impl fmt::Debug for Anchor {
@@ -49,7 +84,7 @@ impl Guest {
         let RawWindowHandle::Wayland(raw_window) = window.window_handle().ok()?.as_raw() else {
             return None;
         };
-        let anchor = Anchor { _window: Arc::clone(window), _display: display.clone() };
+        let anchor = Anchor { _window: Arc::clone(window), display: display.clone() };
         // SAFETY: the pointer is a live `wl_display`, because winit says so of a handle that it
         // lends, and stays one: `anchor` owns the display and is dropped after the connection, here
         // and in every struct that takes this one apart.

@@ -46,6 +46,24 @@ const ANSWERS_TO_SWITCH: u32 = 4;
 /// says.
 const PLAUSIBLE: MonoSpan = MonoSpan::from_ms(1_000);
 
+/// Open when the compositor wants another frame: then a driver that waits for that does not wait.
+#[derive(Clone, Debug)]
+pub(in crate::sink::window) struct Gate(Arc<AtomicBool>);
+
+impl Gate {
+    pub(in crate::sink::window) fn open() -> Self {
+        Self(Arc::new(AtomicBool::new(true)))
+    }
+
+    pub(in crate::sink::window) fn is_open(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+
+    pub(super) fn shut(&self) {
+        self.0.store(false, Ordering::Relaxed);
+    }
+}
+
 /// The thread's own state, and what it shares with the stream's.
 pub(super) struct Listener {
     shared: Arc<Shared>,
@@ -229,6 +247,21 @@ impl Dispatch<WlCallback, MonoTime> for Listener {
         // was.
         if let Some((replaced, _)) = state.drawn.replace((planned, clock::now())) {
             state.tell(Told::Discarded { planned: replaced });
+        }
+    }
+}
+
+impl Dispatch<WlCallback, Gate> for Listener {
+    fn event(
+        _: &mut Self,
+        _: &WlCallback,
+        event: wl_callback::Event,
+        Gate(is_open): &Gate,
+        _: &Connection,
+        _: &QueueHandle<Self>,
+    ) {
+        if let wl_callback::Event::Done { .. } = event {
+            is_open.store(true, Ordering::Relaxed);
         }
     }
 }

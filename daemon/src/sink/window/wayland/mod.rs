@@ -1,7 +1,8 @@
-//! Pictures on Wayland: own shared memory on the desktop window's surface, with feedback.
+//! Pictures on Wayland, with feedback: in shared memory of our own, or as a graphics driver draws.
 //!
 //! - [`guest`]: the way onto the surface; all `unsafe` of windows
-//! - [`surface`]: buffers, commits, and what is asked for with each
+//! - [`face`]: the surface, and what is asked for with each commit, whoever draws
+//! - [`surface`]: a surface that the CPU draws on
 //! - [`pool`]: memory that the compositor reads
 //! - [`cell`]: a surface inside the window's, where streams share one
 //! - [`backdrop`]: what is behind those
@@ -11,6 +12,7 @@
 mod answers;
 mod backdrop;
 mod cell;
+mod face;
 mod guest;
 mod listener;
 mod pool;
@@ -18,5 +20,7 @@ mod surface;
 
 pub(super) use backdrop::Backdrop;
 pub(super) use cell::Role;
+pub(super) use face::Face;
 pub(super) use guest::Guest;
+pub(super) use listener::Gate;
 pub(super) use surface::WaylandSurface;

@@ -1,143 +1,37 @@
-//! The surface: a free buffer, what is asked for with it, and the commit.
+//! Pictures through shared memory: a free buffer, the picture in it, and the commit.
 
-use std::io::ErrorKind;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::thread::{self, JoinHandle};
-use std::time::Duration;
 
 use foreframe_engine::{ColorPlane, MonoTime, StreamFormat};
 use tracing::{debug, warn};
-use wayland_client::backend::WaylandError;
-use wayland_client::globals::registry_queue_init;
-use wayland_client::protocol::wl_shm::WlShm;
-use wayland_client::protocol::wl_surface::WlSurface;
-use wayland_client::{Connection, EventQueue, Proxy as _, QueueHandle};
-use wayland_protocols::wp::presentation_time::client::wp_presentation::WpPresentation;
-use wayland_protocols::wp::viewporter::client::wp_viewport::WpViewport;
-use wayland_protocols::wp::viewporter::client::wp_viewporter::WpViewporter;
 
-use super::answers::Answers;
-use super::cell::{Cell, Role};
-use super::guest::{Anchor, Guest};
-use super::listener::Listener;
+use super::face::{Face, Globals};
 use super::pool::{Buffer, Pool};
-use crate::sink::window::placement::Placement;
-use crate::sink::window::shared::Shared;
-use crate::sink::window::texels::{ByteOrder, Texels};
-use crate::sink::window::{Closed, Feedback, WindowError};
+use crate::sink::window::texels::Texels;
 
-/// Time that a compositor has to say what it offers.
-const ANSWER_WITHIN: Duration = Duration::from_secs(5);
-/// Where a compositor has this, winit makes the surface's viewport, and there can be but one.
-const FRACTIONAL_SCALE: &str = "wp_fractional_scale_manager_v1";
-/// What streams need to share a window.
-const FOR_SEVERAL: [&str; 2] = ["wp_viewporter", "wl_subcompositor"];
-
-/// A window's surface.
+/// A surface that the CPU draws on.
 #[derive(Debug)]
 pub(in crate::sink::window) struct WaylandSurface {
-    shared: Arc<Shared>,
-    answers: Arc<Mutex<Answers>>,
-    is_ending: Arc<AtomicBool>,
-    listener: Option<JoinHandle<()>>,
-    globals: Globals,
     texels: Texels,
     pool: Option<Pool>,
     /// Buffers of former sizes that the compositor has not given back.
     retired: Vec<Buffer>,
-    logical_size: [u32; 2],
     /// Pictures for which no buffer was free.
     without_buffer: u64,
-    surface: WlSurface,
-    /// Where that is inside the window's.
-    cell: Option<Cell>,
-    connection: Connection,
-    /// After everything that is on the connection.
-    _anchor: Arc<Anchor>,
-}
-
-/// What the compositor offers.
-#[derive(Debug)]
-struct Globals {
-    handle: QueueHandle<Listener>,
-    shm: WlShm,
-    presentation: Option<WpPresentation>,
-    order: ByteOrder,
-    stretch: Stretch,
-}
-
-/// Who makes a buffer fill the window.
-#[derive(Debug)]
-enum Stretch {
-    /// The compositor, as winit tells it to.
-    ByWinit,
-    /// The compositor, as we tell it to.
-    ByUs(WpViewport),
-    /// Nobody: a buffer has the window's size.
-    No,
+    face: Arc<Mutex<Face>>,
 }
 
 impl WaylandSurface {
-    pub(in crate::sink::window) fn new(
-        guest: Guest,
-        format: &StreamFormat,
-        shared: Arc<Shared>,
-        role: Role,
-    ) -> Result<Self, WindowError> {
-        let Guest { surface, connection, anchor } = guest;
-        let anchor = Arc::new(anchor);
-        let answers = Arc::new(Mutex::new(Answers::new(true)));
-        let is_ending = Arc::new(AtomicBool::new(false));
-        let (tell, told) = sync_channel(1);
-        let thread = {
-            // The queue that the thread makes needs the anchor for as long as it is there.
-            let (anchor, connection) = (Arc::clone(&anchor), connection.clone());
-            let (surface, is_ending) = (surface.clone(), Arc::clone(&is_ending));
-            let listener = Listener::new(Arc::clone(&shared), Arc::clone(&answers));
-            thread::Builder::new().name("foreframe-listener".to_owned()).spawn(move || {
-                let _anchor = anchor;
-                if let Some((queue, listener)) = bind(connection, &surface, role, listener, &tell) {
-                    drop((surface, tell));
-                    listener.listen(queue, &is_ending);
-                }
-            })?
-        };
-        let (globals, cell) = match told.recv_timeout(ANSWER_WITHIN) {
-            Ok(found) => found?,
-            Err(RecvTimeoutError::Timeout) => {
-                is_ending.store(true, Ordering::Relaxed);
-                return Err(WindowError::NoAnswer("none in 5 s"));
-            }
-            Err(RecvTimeoutError::Disconnected) => {
-                return Err(WindowError::NoAnswer("one that is gone"));
-            }
-        };
-        *answers.lock().unwrap_or_else(PoisonError::into_inner) =
-            Answers::new(globals.presentation.is_some());
-        let surface = cell.as_ref().map_or(surface, |cell| cell.surface.clone());
-        debug!(order = ?globals.order, stretch = ?globals.stretch, "surface");
-        Ok(Self {
-            shared,
-            answers,
-            is_ending,
-            listener: Some(thread),
-            texels: Texels::new(format, globals.order),
-            globals,
+    pub(in crate::sink::window) fn new(face: Arc<Mutex<Face>>, format: &StreamFormat) -> Self {
+        let order = face.lock().unwrap_or_else(PoisonError::into_inner).globals.order;
+        Self {
+            texels: Texels::new(format, order),
             pool: None,
             retired: Vec::new(),
-            logical_size: [0; 2],
             without_buffer: 0,
-            surface,
-            cell,
-            connection,
-            _anchor: anchor,
-        })
-    }
-
-    pub(in crate::sink::window) fn feedback(&self) -> Feedback {
-        self.answers.lock().unwrap_or_else(PoisonError::into_inner).mode()
+            face,
+        }
     }
 
     /// Commits `frame`, if there is a buffer for it.
@@ -146,7 +40,9 @@ impl WaylandSurface {
         planned: MonoTime,
         frame: &ColorPlane,
     ) -> bool {
-        if !self.surface.is_alive() || !self.has_fitting_pool([frame.width(), frame.height()]) {
+        let mut face = self.face.lock().unwrap_or_else(PoisonError::into_inner);
+        let size = [frame.width(), frame.height()];
+        if !face.is_alive() || !fit(&mut self.pool, &mut self.retired, &face, size) {
             return false;
         }
         let Some(pool) = &mut self.pool else { return false };
@@ -158,190 +54,61 @@ impl WaylandSurface {
             warn!(%error, "a picture did not reach its buffer");
             return false;
         }
-        self.ask(planned);
-        self.stretch();
-        self.commit(index)
+        face.before_commit(planned, None);
+        let Buffer { proxy, is_busy } = pool.buffer(index);
+        is_busy.store(true, Ordering::Relaxed);
+        let [width, height] = pool.placement.buffer.map(u32::cast_signed);
+        face.surface.attach(Some(proxy), 0, 0);
+        face.surface.damage_buffer(0, 0, width, height);
+        face.surface.commit();
+        face.after_commit()
     }
 
     /// Makes what was presented last fill the window as it is now, with no buffer more; false where
     /// nothing was.
     pub(super) fn stretch_shown(&mut self) -> bool {
-        if !self.surface.is_alive() || self.pool.is_none() {
-            return false;
-        }
-        self.stretch();
-        self.surface.commit();
-        self.flush()
+        let mut face = self.face.lock().unwrap_or_else(PoisonError::into_inner);
+        face.is_alive() && self.pool.is_some() && face.stretch_shown()
     }
+}
 
-    /// Makes buffers of the window's shape, if there are none.
-    fn has_fitting_pool(&mut self, picture: [u32; 2]) -> bool {
-        self.retired.retain(|buffer| {
-            let is_free = buffer.is_free();
-            if is_free {
-                buffer.proxy.destroy();
-            }
-            !is_free
-        });
-        let window = self.shared.size();
-        let placement = match self.globals.stretch {
-            Stretch::No => Placement::scaled(picture, window),
-            Stretch::ByWinit | Stretch::ByUs(_) => Placement::padded(picture, window),
-        };
-        if self.pool.as_ref().is_some_and(|pool| pool.placement == placement) {
-            return true;
+/// Makes buffers of the window's shape, if there are none.
+fn fit(pool: &mut Option<Pool>, retired: &mut Vec<Buffer>, face: &Face, picture: [u32; 2]) -> bool {
+    retired.retain(|buffer| {
+        let is_free = buffer.is_free();
+        if is_free {
+            buffer.proxy.destroy();
         }
-        let Globals { shm, handle, order, .. } = &self.globals;
-        match Pool::allocate(shm, handle, placement, *order) {
-            Ok(pool) => {
-                debug!(?window, ?placement, "buffers");
-                let former = self.pool.replace(pool);
-                self.retired.extend(former.into_iter().flat_map(Pool::into_buffers));
-                true
-            }
-            Err(error) => {
-                warn!(%error, "there are no buffers for the window");
-                false
-            }
-        }
+        !is_free
+    });
+    let placement = face.place(picture);
+    if pool.as_ref().is_some_and(|pool| pool.placement == placement) {
+        return true;
     }
-
-    /// Makes the next commit fill the window.
-    fn stretch(&mut self) {
-        let Stretch::ByUs(viewport) = &self.globals.stretch else { return };
-        // winit sets the scale of a surface that it makes no viewport for; ours makes up for it.
-        self.surface.set_buffer_scale(1);
-        let logical_size = self.shared.logical_size();
-        if logical_size != self.logical_size && logical_size.iter().all(|&length| length > 0) {
-            let [width, height] = logical_size.map(u32::cast_signed);
-            viewport.set_destination(width, height);
-            self.logical_size = logical_size;
+    let Globals { shm, handle, order, .. } = &face.globals;
+    match Pool::allocate(shm, handle, placement, *order) {
+        Ok(new) => {
+            debug!(?placement, "buffers");
+            let former = pool.replace(new);
+            retired.extend(former.into_iter().flat_map(Pool::into_buffers));
+            true
         }
-    }
-
-    /// For word of the next commit.
-    fn ask(&self, planned: MonoTime) {
-        let handle = &self.globals.handle;
-        let (ask, change) = self.answers.lock().unwrap_or_else(PoisonError::into_inner).on_frame();
-        change.into_iter().for_each(|change| self.shared.tell(change.into()));
-        if let Some(presentation) = self.globals.presentation.as_ref().filter(|_| ask.feedback) {
-            presentation.feedback(&self.surface, handle, planned);
-        }
-        if ask.callback {
-            self.surface.frame(handle, planned);
-        }
-    }
-
-    fn commit(&mut self, index: usize) -> bool {
-        let Some(pool) = &self.pool else { return false };
-        let Buffer { proxy, is_busy } = pool.buffer(index);
-        is_busy.store(true, Ordering::Relaxed);
-        let [width, height] = pool.placement.buffer.map(u32::cast_signed);
-        self.surface.attach(Some(proxy), 0, 0);
-        self.surface.damage_buffer(0, 0, width, height);
-        self.surface.commit();
-        if let Some(cell) = &mut self.cell {
-            cell.put(self.shared.left());
-        }
-        self.flush()
-    }
-
-    fn flush(&self) -> bool {
-        match self.connection.flush() {
-            Ok(()) => true,
-            // The rest goes out with the next frame.
-            Err(WaylandError::Io(error)) if error.kind() == ErrorKind::WouldBlock => true,
-            Err(error) => {
-                debug!(%error, "the compositor takes nothing");
-                self.shared.close(Closed::WithDisplay);
-                false
-            }
+        Err(error) => {
+            warn!(%error, "there are no buffers for the window");
+            false
         }
     }
 }
 
 impl Drop for WaylandSurface {
     fn drop(&mut self) {
-        self.is_ending.store(true, Ordering::Relaxed);
-        if let Some(listener) = self.listener.take()
-            && listener.join().is_err()
-        {
-            warn!("the thread that listens to the compositor has panicked");
-        }
         let buffers = self.pool.take().map(Pool::into_buffers).unwrap_or_default();
         self.retired.drain(..).chain(buffers).for_each(|buffer| buffer.proxy.destroy());
-        if let Stretch::ByUs(viewport) = &self.globals.stretch {
-            viewport.destroy();
-        }
-        drop(self.cell.take());
-        if let Some(presentation) = &self.globals.presentation {
-            presentation.destroy();
-        }
-        // Without a compositor there is nothing left to destroy.
-        drop(self.connection.flush());
         if self.without_buffer > 0 {
             warn!(
                 pictures = self.without_buffer,
                 "the compositor kept all buffers for some pictures"
             );
-        }
-    }
-}
-
-type Bound = (EventQueue<Listener>, Listener);
-/// What the compositor offers, and the surface inside the window's where one was asked for.
-type Found = (Globals, Option<Cell>);
-
-/// Binds what the surface needs, tells it, and gives back what goes on listening.
-fn bind(
-    connection: Connection,
-    window: &WlSurface,
-    role: Role,
-    mut listener: Listener,
-    tell: &SyncSender<Result<Found, WindowError>>,
-) -> Option<Bound> {
-    let found = registry_queue_init::<Listener>(&connection)
-        .map_err(|error| WindowError::NoDisplay(error.to_string()))
-        .and_then(|(list, mut queue)| {
-            let handle = queue.handle();
-            let shm: WlShm =
-                list.bind(&handle, 1..=1, ()).map_err(|_| WindowError::Lacks("wl_shm"))?;
-            let has = |name: &str| {
-                list.contents().with_list(|all| all.iter().any(|one| one.interface == name))
-            };
-            if role != Role::Whole
-                && let Some(lacking) = FOR_SEVERAL.into_iter().find(|name| !has(name))
-            {
-                return Err(WindowError::Lacks(lacking));
-            }
-            let presentation: Option<WpPresentation> = list.bind(&handle, 1..=1, ()).ok();
-            let viewporter: Option<WpViewporter> = list.bind(&handle, 1..=1, ()).ok();
-            let cell = match role {
-                Role::Whole | Role::Behind => None,
-                Role::Part => Some(Cell::new(&list, &handle, window)?),
-            };
-            let surface = cell.as_ref().map_or(window, |cell| &cell.surface);
-            let stretch = match viewporter {
-                Some(_) if cell.is_none() && has(FRACTIONAL_SCALE) => Stretch::ByWinit,
-                Some(viewporter) => Stretch::ByUs(viewporter.get_viewport(surface, &handle, ())),
-                None => Stretch::No,
-            };
-            // Formats and the clock have come when this returns.
-            queue
-                .roundtrip(&mut listener)
-                .map_err(|error| WindowError::NoDisplay(error.to_string()))?;
-            let order = if listener.knows_rgbx { ByteOrder::Rgbx } else { ByteOrder::Bgrx };
-            Ok((queue, (Globals { handle, shm, presentation, order, stretch }, cell)))
-        });
-    match found {
-        Ok((queue, found)) => {
-            tell.send(Ok(found)).ok()?;
-            Some((queue, listener))
-        }
-        Err(error) => {
-            // Whoever asked may have given up.
-            drop(tell.send(Err(error)));
-            None
         }
     }
 }
