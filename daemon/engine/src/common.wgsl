@@ -20,7 +20,12 @@ struct FrameParams {
     levels: u32,
     most_step: u32,
     is_selective: u32,
-    reserved: u32,
+    compares_depth: u32,
+    older_start: vec2<u32>,
+    older_size: vec2<u32>,
+    older_cells: vec2<u32>,
+    ahead: i32,
+    older_weight: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: FrameParams;
@@ -73,7 +78,12 @@ fn displacement(word: u32) -> vec2<i32> {
     if word == HOLE {
         return vec2<i32>(0, 0);
     }
-    return (velocity_of(word) * params.phase + 256) >> vec2<u32>(9u, 9u);
+    return displaced(word, params.phase);
+}
+
+// The same after any phase, of a velocity that is known.
+fn displaced(word: u32, phase: i32) -> vec2<i32> {
+    return (velocity_of(word) * phase + 256) >> vec2<u32>(9u, 9u);
 }
 
 fn cell_index(cell: vec2<u32>) -> u32 {

@@ -15,6 +15,7 @@ use crate::warp::grid::GRID;
 use crate::warp::linear::{LINEAR, PREVIOUS};
 use crate::warp::resolve::{CLASSIFY, RESOLVE};
 use crate::warp::scatter::{SCATTER, SOURCE};
+use crate::warp::voxel::{VOXEL, VOXEL_OLDER};
 
 /// How close two implementations of a kernel have to come.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -54,7 +55,8 @@ pub const KERNELS: &[Kernel] = &[
     exact("warp/linear", "warp_linear", Some(&LINEAR)),
     exact("warp/linear", "has_previous", Some(&PREVIOUS)),
     exact("warp/grid", "warp_grid", Some(&GRID)),
-    exact("warp/voxel", "warp_voxel", None),
+    exact("warp/voxel", "warp_voxel", Some(&VOXEL)),
+    exact("warp/voxel", "older_part", Some(&VOXEL_OLDER)),
     exact("finish/selection", "take_key", None),
     exact("finish/pyramid", "pyramid", Some(&PYRAMID)),
     exact("finish/compensate", "compensate", Some(&COMPENSATE)),

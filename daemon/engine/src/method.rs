@@ -90,12 +90,6 @@ impl Method {
         }
     }
 
-    /// Whether GPUs make its frames, where a stream has one; the CPU makes those of all others.
-    #[must_use]
-    pub const fn runs_on_gpus(self) -> bool {
-        !matches!(self, Self::Voxel)
-    }
-
     /// Whether it goes by motion, and so by an estimate where a key has none.
     #[must_use]
     pub const fn follows_motion(self) -> bool {

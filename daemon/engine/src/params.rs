@@ -13,6 +13,7 @@ use crate::phase::Phase;
 use crate::warp::linear::one_cell;
 use crate::warp::resolve::smooth_limit;
 use crate::warp::scatter::phase_in_cells;
+use crate::warp::voxel::OlderPart;
 
 /// What every kernel's shader reads beside planes: `FrameParams` of `common.wgsl`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, IntoBytes, Immutable)]
@@ -48,8 +49,18 @@ pub struct FrameParams {
     pub most_step: u32,
     /// 1 where tiles are blurred as far as their weights say, 0 where all of the picture is.
     pub is_selective: u32,
-    /// 0: fills the struct up to what a shader takes it to be.
-    pub reserved: u32,
+    /// 1 where depths of the newest key and the one before can be compared, else 0.
+    pub compares_depth: u32,
+    /// First column and row of the valid rectangle of the key before.
+    pub older_start: [u32; 2],
+    /// Columns and rows of that.
+    pub older_size: [u32; 2],
+    /// Columns and rows of its field grid; 0 without one.
+    pub older_cells: [u32; 2],
+    /// From the key before to a frame between the two, Q12.
+    pub ahead: i32,
+    /// Its share in that frame, 1/256.
+    pub older_weight: u32,
 }
 
 impl FrameParams {
@@ -72,6 +83,23 @@ impl FrameParams {
             params.one_cell = one_cell(map);
         }
         params
+    }
+
+    /// The same of a frame between `older` and `newer`: `part` is the part of `older` in it.
+    /// `is_still` says that nothing moves.
+    #[must_use]
+    pub fn between(self, keys: [&KeyFrame; 2], part: OlderPart, is_still: bool) -> Self {
+        let [older, newer] = keys;
+        let has_depth = [older, newer].iter().all(|key| !key.depth.data().is_empty());
+        Self {
+            compares_depth: u32::from(has_depth && !is_still),
+            older_start: [older.valid.x, older.valid.y],
+            older_size: [older.valid.width, older.valid.height],
+            older_cells: [older.depth.width(), older.depth.height()],
+            ahead: part.ahead.q12(),
+            older_weight: part.weight,
+            ..self
+        }
     }
 
     /// The same with what finishing makes of the picture.
@@ -129,7 +157,7 @@ pub fn map_words(map: &FieldMap, words: &mut Vec<u32>) {
     words.clear();
     let axes = [&map.x, &map.y];
     for axis in axes {
-        words.extend((0..axis.pixels()).map(|index| place_word(axis, index)));
+        place_words(axis, words);
     }
     for axis in axes {
         words.extend((0..axis.cells()).map(|cell| axis.centre(cell).cast_unsigned()));
@@ -138,6 +166,11 @@ pub fn map_words(map: &FieldMap, words: &mut Vec<u32>) {
         words.extend((0..axis.cells() as usize).map(|cell| axis.pixels_of(cell).start as u32));
         words.push(axis.pixels());
     }
+}
+
+/// Adds the words of the pixels of one axis.
+pub fn place_words(axis: &FieldAxis, words: &mut Vec<u32>) {
+    words.extend((0..axis.pixels()).map(|index| place_word(axis, index)));
 }
 
 fn place_word(axis: &FieldAxis, index: u32) -> u32 {

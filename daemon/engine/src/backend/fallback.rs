@@ -61,9 +61,6 @@ impl Backend {
         method: Method,
         finishes: bool,
     ) {
-        if !method.runs_on_gpus() {
-            return;
-        }
         match GpuBackend::new(gpu, format, method, finishes) {
             Ok(backend) => {
                 self.gpu = Some(backend);

@@ -76,16 +76,26 @@ fn mix_texels(a: Texel, b: Texel, weight: u32) -> Texel {
 
 // The Q8 position clamped to the pixel centres of the valid rectangle.
 fn clamp_valid(q: vec2<i32>) -> vec2<i32> {
-    let first = vec2<i32>(params.valid_start << vec2<u32>(8u));
-    let last = vec2<i32>((params.valid_start + params.valid_size - 1u) << vec2<u32>(8u));
+    return clamp_within(q, params.valid_start, params.valid_size);
+}
+
+// The same for any rectangle.
+fn clamp_within(q: vec2<i32>, start: vec2<u32>, size: vec2<u32>) -> vec2<i32> {
+    let first = vec2<i32>(start << vec2<u32>(8u));
+    let last = vec2<i32>((start + size - 1u) << vec2<u32>(8u));
     return clamp(q, first, last);
 }
 
 // The key's colour at a Q8 position, bilinear, clamped to the pixel centres of the valid rectangle.
 fn sample(q: vec2<i32>) -> Texel {
-    let clamped = vec2<u32>(clamp_valid(q));
+    return sample_within(q, params.valid_start, params.valid_size);
+}
+
+// The same for any rectangle inside the plane.
+fn sample_within(q: vec2<i32>, start: vec2<u32>, size: vec2<u32>) -> Texel {
+    let clamped = vec2<u32>(clamp_within(q, start, size));
     let low = clamped >> vec2<u32>(8u);
-    let high = min(low + 1u, params.valid_start + params.valid_size - 1u);
+    let high = min(low + 1u, start + size - 1u);
     let corners = array<Texel, 4>(
         read_color(low),
         read_color(vec2<u32>(high.x, low.y)),

@@ -103,7 +103,8 @@ mod on_gpus {
     use super::*;
     use crate::backend::gpu::test_adapters::test_gpus;
 
-    const MOVING: [Method; 4] = [Method::Blend, Method::Gather, Method::Grid, Method::Linear];
+    const MOVING: [Method; 5] =
+        [Method::Blend, Method::Voxel, Method::Gather, Method::Grid, Method::Linear];
 
     /// What two engines show over three keys, two frames each, the second one after `event` was
     /// told of each step.
@@ -127,10 +128,7 @@ mod on_gpus {
                 on_gpu.use_gpu(&gpu);
                 let frames = shown(&mut on_gpu, |_| ());
                 assert_eq!(frames, shown(&mut engine(method), |_| ()), "{method}");
-                let name = match method.runs_on_gpus() {
-                    true => format!("gpu:{}", gpu.name()),
-                    false => "cpu".to_owned(),
-                };
+                let name = format!("gpu:{}", gpu.name());
                 let expected = BackendStatus { name, fell_back: None };
                 assert_eq!(on_gpu.backend(), &expected, "{method}");
             }

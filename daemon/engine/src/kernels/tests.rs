@@ -13,6 +13,7 @@ use crate::backend::shader::{Binding, COLOR, COMMON, FIELD, STRIP};
 use crate::params::FrameParams;
 use crate::warp::grid::TRIANGLE_BYTES;
 use crate::warp::linear::HOLES;
+use crate::warp::voxel::SURFACES;
 
 fn src() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
@@ -81,7 +82,7 @@ fn every_wgsl_file_is_part_of_a_shader_in_the_table() {
         assert_eq!(shader.parts.last(), Some(&own.as_str()), "{}", shader.file);
         assert_eq!(shader.parts.first(), Some(&COMMON), "{}", shader.file);
         for part in &shader.parts[1..shader.parts.len() - 1] {
-            assert!([COLOR, FIELD, HOLES].contains(part), "{}", shader.file);
+            assert!([COLOR, FIELD, HOLES, SURFACES].contains(part), "{}", shader.file);
         }
     }
 }
@@ -185,7 +186,12 @@ fn the_parameters_lie_where_the_shaders_read_them() {
         levels,
         most_step,
         is_selective,
-        reserved
+        compares_depth,
+        older_start,
+        older_size,
+        older_cells,
+        ahead,
+        older_weight
     );
     let found: Vec<_> =
         members.iter().map(|member| (member.name.as_deref().unwrap(), member.offset)).collect();
@@ -213,7 +219,9 @@ fn constants_of_the_shaders_are_those_of_the_cpu() {
     use crate::warp::grid::{FARTHEST, LANES};
     use crate::warp::resolve::HOLE;
     use crate::warp::scatter::{MAX_CELLS, NO_SOURCE, SOURCE_BITS};
-    assert_eq!(LINEAR.entries[1].workgroup, FAR_SIDE.entries[2].workgroup, "both go over lists");
+    let listed = [LINEAR.entries[1], FAR_SIDE.entries[2], VOXEL.entries[1]];
+    let group = listed[0].workgroup;
+    assert!(listed.iter().all(|entry| entry.workgroup == group), "all of them go over lists");
     let hole = u32::from(HOLE.x.cast_unsigned()) | u32::from(HOLE.y.cast_unsigned()) << 16;
     let expected = [
         ("HOLE", i64::from(hole)),
@@ -221,9 +229,10 @@ fn constants_of_the_shaders_are_those_of_the_cpu() {
         ("NO_SOURCE", i64::from(NO_SOURCE)),
         ("NO_CELL", i64::from(NO_CELL)),
         ("NO_ROW", i64::from(NO_ROW)),
-        ("LIST_GROUP", i64::from(LINEAR.entries[1].workgroup[0])),
+        ("LIST_GROUP", i64::from(group[0])),
         ("STRIP", i64::from(STRIP)),
         ("DEPTH_SHIFT", i64::from(crate::warp::linear::DEPTH_SHIFT)),
+        ("SAME_SURFACE_SHIFT", i64::from(crate::warp::voxel::SAME_SURFACE_SHIFT)),
         ("GROUPS_OF_A_ROW", 1024),
         ("NO_TRIANGLE", i64::from(u32::MAX)),
         ("LANES", i64::from(LANES)),

@@ -42,6 +42,7 @@ use crate::warp::grid::{GRID, LANES, MeshWords, TRIANGLE_BYTES};
 use crate::warp::linear::{LINEAR, PREVIOUS, came, has_previous};
 use crate::warp::resolve::{CLASSIFY, RESOLVE};
 use crate::warp::scatter::{SCATTER, SOURCE};
+use crate::warp::voxel::{Between, VOXEL, VOXEL_OLDER, VoxelWords};
 use device::Compiled;
 use planes::Planes;
 use transfer::{Download, Upload};
@@ -49,7 +50,7 @@ use transfer::{Download, Upload};
 /// The shaders that run once per key.
 fn key_shaders(method: Method) -> &'static [&'static Shader] {
     match method {
-        Method::Linear => &[&SOURCE],
+        Method::Linear | Method::Voxel => &[&SOURCE],
         _ => &[],
     }
 }
@@ -69,6 +70,16 @@ fn frame_shaders(method: Method) -> &'static [&'static Shader] {
         Method::Gather => &[&GATHER],
         Method::Grid => &[&GRID],
         Method::Linear => &[&SCATTER, &RESOLVE, &FAR_SIDE, &CLASSIFY, &LINEAR],
+        Method::Voxel => &[&SCATTER, &RESOLVE, &FAR_SIDE, &CLASSIFY, &VOXEL, &VOXEL_OLDER],
+        _ => &[],
+    }
+}
+
+/// The shaders that make a frame between two keys where nothing is known of how surfaces came to
+/// the newer one.
+fn unmoved_shaders(method: Method) -> &'static [&'static Shader] {
+    match method {
+        Method::Voxel => &[&BLEND],
         _ => &[],
     }
 }
@@ -98,6 +109,7 @@ pub(crate) struct GpuBackend {
     key_steps: Vec<Step>,
     accelerating_steps: Vec<Step>,
     frame_steps: Vec<Step>,
+    unmoved_steps: Vec<Step>,
     filling_steps: Vec<Step>,
     /// Empty in a stream that is not finished.
     finish_steps: Vec<Step>,
@@ -115,6 +127,7 @@ pub(crate) struct GpuBackend {
     depth: Vec<u32>,
     was: Vec<u32>,
     mesh: MeshWords,
+    voxel: VoxelWords,
 }
 
 impl GpuBackend {
@@ -137,6 +150,7 @@ impl GpuBackend {
             key_steps: steps(key_shaders(method))?,
             accelerating_steps: steps(accelerating_shaders(method))?,
             frame_steps: steps(frame_shaders(method))?,
+            unmoved_steps: steps(unmoved_shaders(method))?,
             filling_steps: steps(filling_shaders(method))?,
             finish_steps: if finishes { steps(&FINISH_SHADERS)? } else { Vec::new() },
             has_lights: false,
@@ -149,6 +163,7 @@ impl GpuBackend {
             depth: Vec::new(),
             was: Vec::new(),
             mesh: MeshWords::default(),
+            voxel: VoxelWords::default(),
         })
     }
 
@@ -158,21 +173,23 @@ impl GpuBackend {
     /// If the device is gone, or the key too large for it.
     pub(crate) fn take_key(&mut self, key: &KeyFrame, map: &FieldMap) -> Result<(), GpuError> {
         let moves = !key.velocity.data().is_empty();
-        if self.method == Method::Hold || (self.method != Method::Blend && !moves) {
+        if self.method == Method::Hold || (!self.method.interpolates() && !moves) {
             return Ok(());
         }
-        if self.method == Method::Grid {
-            self.mesh.take_key(key);
+        match self.method {
+            Method::Grid => self.mesh.take_key(key),
+            Method::Voxel => self.voxel.take_key(key),
+            _ => (),
         }
         let gpu = Arc::clone(&self.gpu);
         gpu.guard(|| {
-            if matches!(self.method, Method::Blend | Method::Linear) {
+            if matches!(self.method, Method::Blend | Method::Voxel | Method::Linear) {
                 self.planes.swap(Slot::Color, Slot::Older);
             }
             if self.method == Method::Linear {
                 self.send_past(key)?;
             }
-            if self.method != Method::Blend {
+            if self.method != Method::Blend && moves {
                 self.send_field(key, map)?;
             }
             self.send_color(key)
@@ -199,8 +216,12 @@ impl GpuBackend {
             &[(Slot::Vertices, vertices.as_bytes()), (Slot::Cuts, cuts.as_bytes())]
         } else {
             map_words(map, &mut self.tables);
+            let velocity = match self.method {
+                Method::Voxel => &self.voxel.turned,
+                _ => &key.velocity,
+            };
             &[
-                (Slot::Velocity, key.velocity.data().as_bytes()),
+                (Slot::Velocity, velocity.data().as_bytes()),
                 (Slot::Depth, depth),
                 (Slot::Tables, self.tables.as_bytes()),
                 (Slot::Acceleration, key.acceleration.data().as_bytes()),
@@ -234,6 +255,17 @@ impl GpuBackend {
             let past = self.planes.sized(&gpu, Slot::Was, 2 * cells)?;
             gpu.queue.write_buffer(past, 0, self.was.as_bytes());
             gpu.queue.write_buffer(past, cells, came(key).data().as_bytes());
+        }
+        Ok(())
+    }
+
+    /// Sends what frames between two keys read of `older` beside its colour, unless it is there.
+    fn send_older(&mut self, older: &KeyFrame) -> Result<(), GpuError> {
+        if self.voxel.take_older(older) {
+            let gpu = Arc::clone(&self.gpu);
+            let bytes = self.voxel.past.as_bytes();
+            let past = self.planes.sized(&gpu, Slot::Was, bytes.len() as u64)?;
+            gpu.queue.write_buffer(past, 0, bytes);
         }
         Ok(())
     }
@@ -335,6 +367,16 @@ impl GpuBackend {
         let gpu = Arc::clone(&self.gpu);
         gpu.guard(|| {
             let mut params = self.params(frame.newest, frame.map, frame.phase);
+            let older = frame.previous.filter(|_| self.method == Method::Voxel);
+            let mut is_unmoved = false;
+            if let Some(older) = older {
+                let between = Between { older, newer: frame.newest, phase: frame.phase };
+                match self.voxel.params(params, &between) {
+                    Some(between) => params = between,
+                    None => is_unmoved = true,
+                }
+                self.send_older(older)?;
+            }
             let bytes_per_pixel = u64::from(out.format().bytes_per_pixel());
             let bytes = out.as_mut_bytes();
             let size = bytes.len() as u64;
@@ -348,7 +390,8 @@ impl GpuBackend {
             if !frame.newest.acceleration.data().is_empty() {
                 dispatch(&gpu, &mut commands, &self.accelerating_steps, &self.planes, &params)?;
             }
-            dispatch(&gpu, &mut commands, &self.frame_steps, &self.planes, &params)?;
+            let steps = if is_unmoved { &self.unmoved_steps } else { &self.frame_steps };
+            dispatch(&gpu, &mut commands, steps, &self.planes, &params)?;
             if frame.previous.is_some_and(|older| has_previous(frame.newest, older)) {
                 dispatch(&gpu, &mut commands, &self.filling_steps, &self.planes, &params)?;
             }

@@ -8,6 +8,8 @@ use crate::plane::{Plane, Rect};
 use crate::testing::{hash, map_of, noise, plane, pool};
 use crate::time::MonoTime;
 
+mod between;
+
 const FORMATS: [ColorFormat; 3] = [ColorFormat::Rgba8, ColorFormat::Rgb10a2, ColorFormat::Rgba16f];
 const WARPS: [Method; 3] = [Method::Gather, Method::Grid, Method::Linear];
 

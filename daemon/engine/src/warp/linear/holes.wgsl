@@ -108,3 +108,22 @@ fn is_far(q: vec2<i32>, depth: u32) -> bool {
     let surface = surface_at(q);
     return surface.is_there && is_as_near(depth, surface.depth);
 }
+
+// Whether the cells around one do not agree, the rule of `classify.wgsl`.
+fn is_broken(cell: vec2<u32>) -> bool {
+    let first = max(cell, vec2<u32>(1u)) - 1u;
+    let end = min(cell + 1u, params.cells - 1u);
+    var low = velocity_of(carried[cell_index(cell)]);
+    var high = low;
+    for (var y = first.y; y <= end.y; y++) {
+        for (var x = first.x; x <= end.x; x++) {
+            let word = carried[cell_index(vec2<u32>(x, y))];
+            if word == HOLE {
+                return true;
+            }
+            low = min(low, velocity_of(word));
+            high = max(high, velocity_of(word));
+        }
+    }
+    return !all(vec2<u32>(high - low) <= vec2<u32>(params.smooth_limit));
+}

@@ -38,25 +38,6 @@ fn fill_from_previous(@builtin(global_invocation_id) id: vec3<u32>) {
     }
 }
 
-// Whether the cells around one do not agree, the rule of `classify.wgsl`.
-fn is_broken(cell: vec2<u32>) -> bool {
-    let first = max(cell, vec2<u32>(1u)) - 1u;
-    let end = min(cell + 1u, params.cells - 1u);
-    var low = velocity_of(carried[cell_index(cell)]);
-    var high = low;
-    for (var y = first.y; y <= end.y; y++) {
-        for (var x = first.x; x <= end.x; x++) {
-            let word = carried[cell_index(vec2<u32>(x, y))];
-            if word == HOLE {
-                return true;
-            }
-            low = min(low, velocity_of(word));
-            high = max(high, velocity_of(word));
-        }
-    }
-    return !all(vec2<u32>(high - low) <= vec2<u32>(params.smooth_limit));
-}
-
 // Whether the key before shows a surface of depth key `depth` at the pixel nearest to `q`.
 fn shows(q: vec2<i32>, depth: u32) -> bool {
     // Left of or above the rectangle the difference wraps and is larger than any size.

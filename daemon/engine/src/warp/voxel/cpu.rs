@@ -18,7 +18,7 @@ use crate::warp::{for_each_valid_row, moved};
 
 /// Depth keys of one surface in two keys may differ by one part in 2 to this power, as in motion
 /// that is composed over several frames.
-const SAME_SURFACE_SHIFT: u32 = 3;
+pub const SAME_SURFACE_SHIFT: u32 = 3;
 
 /// The keys around a frame and where between them it lies.
 #[derive(Clone, Copy, Debug)]
@@ -31,6 +31,29 @@ pub struct Between<'a> {
     pub phase: Phase,
 }
 
+/// The part that the older key has in a frame between two.
+#[derive(Clone, Copy, Debug)]
+pub struct OlderPart {
+    /// From that key to the frame, in spans of the newer key's motion.
+    pub ahead: Phase,
+    /// Its share, 1/256.
+    pub weight: u32,
+}
+
+/// The part that `between.older` has; None where nothing is known of how surfaces came to the newer
+/// key: then the frame is the mean of both.
+#[must_use]
+pub fn older_part(between: &Between<'_>) -> Option<OlderPart> {
+    let Between { older, newer, phase } = *between;
+    let whole = Phase::at(newer.content_time, older.content_time, newer.motion_span()?);
+    // A frame lies between the keys, so neither share is 0.
+    let weight = (phase.q12() * 256 + whole.q12() / 2) / whole.q12().max(1);
+    Some(OlderPart {
+        ahead: Phase::from_q12(whole.q12() - phase.q12()),
+        weight: weight.clamp(0, 256).cast_unsigned(),
+    })
+}
+
 /// Makes the frame between two keys into `out`, which has their size and format. `map` is the map
 /// of the newer key's field grid; `scratch` has taken that key if it has a velocity field.
 pub fn warp_voxel(
@@ -41,15 +64,11 @@ pub fn warp_voxel(
     out: &mut ColorPlane,
 ) {
     let Between { older, newer, phase } = *between;
-    let Some(span) = newer.motion_span() else {
+    let Some(OlderPart { ahead, weight }) = older_part(between) else {
         blend(pool, &older.color, &newer.color, out);
         return;
     };
     scratch.resolve(pool, map, phase, older);
-    let whole = Phase::at(newer.content_time, older.content_time, span);
-    let ahead = Phase::from_q12(whole.q12() - phase.q12());
-    // The share of the older key in 1/256; a frame lies between the keys, so neither share is 0.
-    let older_weight = (phase.q12() * 256 + whole.q12() / 2) / whole.q12().max(1);
     let has_depth = !newer.depth.data().is_empty()
         && !older.depth.data().is_empty()
         && !scratch.source.is_still();
@@ -61,7 +80,7 @@ pub fn warp_voxel(
         valid: newer.valid,
         phase,
         ahead,
-        older_weight: older_weight.clamp(0, 256).cast_unsigned(),
+        older_weight: weight,
         one_cell: one_cell(map),
     };
     match (&older.color, &newer.color, out) {

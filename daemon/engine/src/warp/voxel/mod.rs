@@ -25,13 +25,16 @@
 //! Their choice of the frame rate from global motion is not a matter of this kernel.
 //!
 //! At the keys' own times the keys are shown. Without a motion field it is the mean of both keys.
-//! Exactness: `Exact`. It runs on the CPU whatever the backend.
+//! The shaders make it in two steps: the part of the newest key, then that of the older one over it.
+//! Exactness: `Exact`.
 
 mod cpu;
+mod gpu;
 mod scratch;
 
-pub use cpu::{Between, warp_voxel};
-pub use scratch::VoxelScratch;
+pub use cpu::{Between, OlderPart, SAME_SURFACE_SHIFT, older_part, warp_voxel};
+pub use gpu::{SURFACES, VOXEL, VOXEL_OLDER, VoxelWords};
+pub use scratch::{VoxelScratch, turn};
 
 #[cfg(test)]
 mod tests;

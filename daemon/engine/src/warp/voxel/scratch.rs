@@ -28,17 +28,22 @@ pub struct VoxelScratch {
     turned: KeyFrame,
 }
 
+/// Turns velocities round, into `turned`: older minus newer position.
+pub fn turn(velocity: &Plane<Velocity>, turned: &mut Plane<Velocity>) {
+    turned.copy_from(velocity);
+    for velocity in turned.data_mut() {
+        if velocity.is_trackable() {
+            *velocity = Velocity { x: -velocity.x, y: -velocity.y };
+        }
+    }
+}
+
 impl VoxelScratch {
     /// Prepares for the frames before `key`, which has a velocity field.
     pub fn take_key(&mut self, pool: &ThreadPool, key: &KeyFrame) {
         let turned = &mut self.turned;
         turned.depth.copy_from(&key.depth);
-        turned.velocity.copy_from(&key.velocity);
-        for velocity in turned.velocity.data_mut() {
-            if velocity.is_trackable() {
-                *velocity = Velocity { x: -velocity.x, y: -velocity.y };
-            }
-        }
+        turn(&key.velocity, &mut turned.velocity);
         self.source.update(pool, turned);
     }
 
