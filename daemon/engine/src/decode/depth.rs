@@ -63,16 +63,29 @@ impl DepthToKey {
         of_nearest.map(|inverse| (inverse / f64::from(u32::MAX)) as f32)
     }
 
-    /// The key of a stored value.
+    /// Writes the keys of stored values.
     #[inline(always)]
-    pub(super) fn key(self, stored: f64) -> u32 {
-        let fraction = match self {
-            Self::Buffer { scale, offset } => scale * stored + offset,
-            // A distance of 0 or behind the eye is as near as can be.
-            Self::Linear { near } => near / stored.max(0.0) + stored * 0.0,
-        };
-        whole(fraction * f64::from(u32::MAX))
+    pub(super) fn write_keys(self, stored: impl Iterator<Item = f64>, keys: &mut [u32]) {
+        // A loop for each: one that chooses at every value is not made for wide registers.
+        match self {
+            Self::Buffer { scale, offset } => {
+                for (key, stored) in keys.iter_mut().zip(stored) {
+                    *key = of_fraction(scale * stored + offset);
+                }
+            }
+            Self::Linear { near } => {
+                for (key, stored) in keys.iter_mut().zip(stored) {
+                    // A distance of 0 or behind the eye is as near as can be.
+                    *key = of_fraction(near / stored.max(0.0) + stored * 0.0);
+                }
+            }
+        }
     }
+}
+
+#[inline(always)]
+fn of_fraction(fraction: f64) -> u32 {
+    whole(fraction * f64::from(u32::MAX))
 }
 
 /// `value as u32`: rounded down, saturating, NaN is 0. Unlike the cast, AVX2 does it to several

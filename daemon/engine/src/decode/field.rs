@@ -138,14 +138,14 @@ impl<'a> FieldInput<'a> {
                             |row| {
                                 if is_own {
                                     let (texels, _) = row.as_chunks::<$bytes>();
-                                    for (key, texel) in out.iter_mut().zip(texels) {
-                                        *key = to_key.key(stored_depth($format, texel, 0));
-                                    }
-                                    return;
+                                    let stored =
+                                        texels.iter().map(|texel| stored_depth($format, texel, 0));
+                                    return to_key.write_keys(stored, out);
                                 }
-                                for (key, &x) in out.iter_mut().zip(columns) {
-                                    *key = to_key.key(stored_depth($format, row, usize::from(x)));
-                                }
+                                let stored = columns
+                                    .iter()
+                                    .map(|&x| stored_depth($format, row, usize::from(x)));
+                                to_key.write_keys(stored, out);
                             },
                         );
                     },

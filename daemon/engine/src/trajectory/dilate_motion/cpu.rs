@@ -106,24 +106,31 @@ impl RowMaxima {
 fn nearest(first: (u32, u32), second: (u32, u32), third: (u32, u32)) -> (u32, u32) {
     let nearer = |a: (u32, u32), b: (u32, u32)| {
         let takes_second = b.0 > a.0;
-        (if takes_second { b.0 } else { a.0 }, if takes_second { b.1 } else { a.1 })
+        (a.0.max(b.0), pick(takes_second, b.1, a.1))
     };
     nearer(nearer(first, second), third)
+}
+
+/// `if first { a } else { b }`, without the choice between two addresses that a compiler makes of
+/// it: wide registers choose between values alone.
+#[inline(always)]
+fn pick(first: bool, a: u32, b: u32) -> u32 {
+    b ^ ((a ^ b) & u32::from(first).wrapping_neg())
 }
 
 /// (1) and (2) for a row of cells with depth keys `centres`, between the row above and the one
 /// below, which are the row itself at the border.
 #[inline(always)]
 fn dilate_row(centres: &[u32], [above, here, below]: [&RowMaxima; 3], velocities: &mut [Velocity]) {
-    let [above_cells, here_cells, below_cells] =
-        [above, here, below].map(|row| row.depth.iter().zip(&row.word));
-    let cells = above_cells.zip(here_cells).zip(below_cells).zip(centres.iter().zip(&here.own));
-    for (velocity, (((above, here), below), (&centre, &own))) in velocities.iter_mut().zip(cells) {
-        let pair = |(depth, word): (&u32, &u32)| (*depth, *word);
-        let (max, word) = nearest(pair(above), pair(here), pair(below));
-        let own: u32 = zerocopy::transmute!(own);
-        let takes_nearest = max - centre > max >> 8;
-        *velocity = zerocopy::transmute!(if takes_nearest { word } else { own });
+    let length = centres.len();
+    let rows = [above, here, below].map(|row| (&row.depth[..length], &row.word[..length]));
+    let own: &[u32] = zerocopy::transmute_ref!(&here.own[..length]);
+    let velocities = &mut velocities[..length];
+    for x in 0..length {
+        let cells = rows.map(|(depth, word)| (depth[x], word[x]));
+        let (max, word) = nearest(cells[0], cells[1], cells[2]);
+        let takes_nearest = max - centres[x] > max >> 8;
+        velocities[x] = zerocopy::transmute!(pick(takes_nearest, word, own[x]));
     }
 }
 
@@ -232,8 +239,10 @@ fn quantise([dx, dy]: [f32; 2], px_per_span: Option<f32>) -> Velocity {
         .map_or(1.0, |px_per_span| tracked_share(libm::sqrtf(dx * dx + dy * dy) / px_per_span));
     let steps = |d: f32| {
         let scaled = d * share * 32.0;
-        let magnitude = (scaled.abs() + 0.5) as i32;
-        (if scaled < 0.0 { -magnitude } else { magnitude }) as i16
+        // At most 1023 * 32 where it counts: adding 2^23 moves it into the low bits of the
+        // mantissa. A cast would saturate, one number at a time.
+        let magnitude = ((scaled.abs() + 0.5).floor() + 8_388_608.0).to_bits() as i16;
+        if scaled < 0.0 { magnitude.wrapping_neg() } else { magnitude }
     };
     let velocity = Velocity { x: steps(dx), y: steps(dy) };
     if is_known { velocity } else { Velocity::UNTRACKABLE }
