@@ -23,6 +23,8 @@ const KEYS: u32 = 3;
 enum Way<'a> {
     /// One thread of the CPU, with no more than every processor of its architecture has.
     Portable,
+    /// The same with AVX2, where the processor has it.
+    Avx2,
     /// The CPU, with all that it has.
     Widest { threads: usize },
     /// A GPU adapter, after decode on the CPU.
@@ -33,6 +35,7 @@ impl fmt::Display for Way<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Portable => f.write_str("portable CPU"),
+            Self::Avx2 => f.write_str("CPU with AVX2"),
             Self::Widest { threads } => write!(f, "CPU with {threads} threads"),
             Self::Gpu(gpu) => f.write_str(gpu.name()),
         }
@@ -44,6 +47,7 @@ fn digest(rendered: &Rendered, method: Method, way: Way<'_>) -> String {
     let mut config = EngineConfig::new(method, NonZeroUsize::MIN);
     match way {
         Way::Portable => config.simd = Simd::Portable,
+        Way::Avx2 => config.simd = Simd::Avx2,
         Way::Widest { threads } => {
             config.threads = NonZeroUsize::new(threads).expect("a positive number");
         }
@@ -78,6 +82,7 @@ fn every_scene_has_one_digest_on_the_cpu_and_on_every_adapter() {
     let ways: Vec<_> = [1, 2, 5]
         .into_iter()
         .map(|threads| Way::Widest { threads })
+        .chain([Way::Avx2])
         .chain(gpus.iter().map(Way::Gpu))
         .collect();
     for scene in SCENES {
@@ -103,7 +108,7 @@ fn one_pixel_of_one_key_makes_another_digest_on_every_way() {
     let before = digest(&rendered, Method::Linear, Way::Portable);
     let middle = rendered.keys[1].color.rgba.len() / 8 * 4;
     rendered.keys[1].color.rgba[middle] ^= 1;
-    let cpu = [Way::Portable, Way::Widest { threads: 1 }];
+    let cpu = [Way::Portable, Way::Avx2, Way::Widest { threads: 1 }];
     for way in cpu.into_iter().chain(gpus.iter().map(Way::Gpu)) {
         assert_ne!(digest(&rendered, Method::Linear, way), before, "{way}");
     }

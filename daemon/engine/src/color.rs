@@ -8,13 +8,17 @@
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 #[cfg(target_arch = "x86_64")]
+mod avx512;
+#[cfg(target_arch = "x86_64")]
 mod sse2;
+#[cfg(test)]
+mod tests;
 
 use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 use crate::plane::{Plane, Rect};
 #[cfg(target_arch = "x86_64")]
-use crate::simd::has_avx2;
+use crate::simd::{has_avx2, has_avx512};
 use crate::warp::sample::{Positions, sample};
 
 /// How the channels of a colour plane are stored.
@@ -206,7 +210,10 @@ impl Texel for Rgba8 {
     #[cfg(target_arch = "x86_64")]
     #[inline(always)]
     fn sample_each(plane: &Plane<Self>, valid: Rect, positions: &impl Positions, out: &mut [Self]) {
-        let done = if has_avx2() {
+        let done = if has_avx512() {
+            // SAFETY: the processor has AVX-512, asked for just above.
+            unsafe { avx512::sample_each(plane, valid, positions, out) }
+        } else if has_avx2() {
             // SAFETY: the processor has AVX2, asked for just above.
             unsafe { avx2::sample_each(plane, valid, positions, out) }
         } else {
@@ -416,134 +423,4 @@ pub const fn half_to_ordered(bits: u16) -> u16 {
 #[must_use]
 pub const fn ordered_to_half(ordered: u16) -> u16 {
     if ordered & 0x8000 == 0 { !ordered } else { ordered & 0x7fff }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::testing::hash;
-    use crate::warp::sample::{Listed, sample_run};
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn all_channels_at_once_equal_channel_by_channel(
-            corners: [u32; 4], fx in 0_u32..256, fy in 0_u32..256,
-        ) {
-            let corners = corners.map(Rgba8);
-            prop_assert_eq!(
-                Rgba8::bilinear(corners, fx, fy),
-                Rgba8::bilinear_by_channel(corners, fx, fy)
-            );
-        }
-
-        #[test]
-        fn sampling_each_of_many_equals_sampling_one_by_one(
-            (width, height) in (1_u32..20, 1_u32..20),
-            (left, top) in (0_u32..4, 0_u32..4),
-            positions in proptest::collection::vec((-900..6000_i32, -900..6000_i32), 0..30),
-            seed: u32,
-        ) {
-            let ColorPlane::Rgba8(plane) =
-                crate::testing::noise(ColorFormat::Rgba8, width + left + 1, height + top, seed)
-            else {
-                unreachable!("the format asked for")
-            };
-            let valid = Rect { x: left, y: top, width, height };
-            let (xs, ys): (Vec<i32>, Vec<i32>) = positions.iter().copied().unzip();
-            let mut out = vec![Rgba8::default(); xs.len()];
-            Rgba8::sample_each(&plane, valid, &Listed { xs: &xs, ys: &ys }, &mut out);
-            for ((x, y), texel) in positions.into_iter().zip(out) {
-                prop_assert_eq!(texel, sample(&plane, valid, x, y), "at {}, {}", x, y);
-            }
-        }
-
-        #[test]
-        fn sampling_close_together_equals_sampling_one_by_one(
-            (width, height) in (1_u32..40, 1_u32..20),
-            (left, top) in (0_u32..4, 0_u32..4),
-            (x, y) in (-900..9000_i32, -900..6000_i32),
-            steps in proptest::collection::vec((150..340_i32, -20..20_i32), 0..30),
-            seed: u32,
-        ) {
-            let ColorPlane::Rgba8(plane) =
-                crate::testing::noise(ColorFormat::Rgba8, width + left, height + top, seed)
-            else {
-                unreachable!("the format asked for")
-            };
-            let valid = Rect { x: left, y: top, width, height };
-            let places = steps.into_iter().scan([x, y], |place, (dx, dy)| {
-                *place = [place[0] + dx, place[1] + dy];
-                Some((place[0], place[1]))
-            });
-            let (xs, ys): (Vec<i32>, Vec<i32>) = places.unzip();
-            let mut out = vec![Rgba8::default(); xs.len()];
-            Rgba8::sample_each(&plane, valid, &Listed { xs: &xs, ys: &ys }, &mut out);
-            for ((x, y), texel) in xs.into_iter().zip(ys).zip(out) {
-                prop_assert_eq!(texel, sample(&plane, valid, x, y), "at {}, {}", x, y);
-            }
-        }
-
-        #[test]
-        fn sampling_a_run_equals_sampling_one_by_one(
-            (width, height) in (1_u32..40, 1_u32..20),
-            (left, top) in (0_u32..4, 0_u32..4),
-            (x, y) in (-900..9000_i32, -900..6000_i32),
-            whole in 0..3,
-            count in 0_usize..30,
-            seed: u32,
-        ) {
-            let ColorPlane::Rgba8(plane) =
-                crate::testing::noise(ColorFormat::Rgba8, width + left + 1, height + top, seed)
-            else {
-                unreachable!("the format asked for")
-            };
-            let valid = Rect { x: left, y: top, width, height };
-            // Some runs lie on columns, and some of those on a row too.
-            let x = if whole > 0 { x & !0xff } else { x };
-            let y = if whole > 1 { y & !0xff } else { y };
-            let mut out = vec![Rgba8::default(); count];
-            sample_run(&plane, valid, [x, y], &mut out);
-            for (x, texel) in (x..).step_by(256).zip(out) {
-                prop_assert_eq!(texel, sample(&plane, valid, x, y), "at {}, {}", x, y);
-            }
-        }
-
-        #[test]
-        fn interpolation_stays_between_its_corners(
-            corners: [[u16; 4]; 4], fx in 0_u32..256, fy in 0_u32..256,
-        ) {
-            let OrderedRgba16(mean) = OrderedRgba16::bilinear(corners.map(OrderedRgba16), fx, fy);
-            for channel in 0..4 {
-                let values = corners.map(|corner| corner[channel]);
-                prop_assert!(values.iter().min() <= Some(&mean[channel]));
-                prop_assert!(values.iter().max() >= Some(&mean[channel]));
-            }
-        }
-    }
-
-    #[test]
-    fn extreme_corners_are_weighed_exactly() {
-        for case in 0..4096 {
-            let corner = |i: u32| if hash(case, i, 0) & 1 == 0 { 0 } else { 0xff00_ff00 };
-            let corners = [0, 1, 2, 3].map(|i| Rgba8(corner(i)));
-            let (fx, fy) = (hash(case, 8, 0) & 255, hash(case, 9, 0) & 255);
-            assert_eq!(
-                Rgba8::bilinear(corners, fx, fy),
-                Rgba8::bilinear_by_channel(corners, fx, fy)
-            );
-        }
-    }
-
-    #[test]
-    fn ordered_halves_sort_as_their_values_and_come_back() {
-        let mut finite: Vec<u16> =
-            (0..=u16::MAX).filter(|bits| half::f16::from_bits(*bits).is_finite()).collect();
-        finite.sort_by_key(|bits| half_to_ordered(*bits));
-        for pair in finite.windows(2) {
-            let [a, b] = [pair[0], pair[1]].map(half::f16::from_bits);
-            assert!(a <= b, "{a} before {b}");
-        }
-        assert!((0..=u16::MAX).all(|bits| ordered_to_half(half_to_ordered(bits)) == bits));
-    }
 }

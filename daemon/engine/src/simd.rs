@@ -2,10 +2,12 @@
 //!
 //! [`widest`] compiles a piece of work twice: for the baseline, and for AVX2, which is asked for at
 //! run time. Both are the same Rust: integer and float operations mean the same in either (nothing
-//! is contracted or reassociated), so the result does not depend on the processor.
+//! is contracted or reassociated), so the result does not depend on the processor. A few kernels
+//! are written for a kind of registers by hand, some for AVX-512 as well: by itself the compiler
+//! gains nothing by those.
 //!
 //! [`Simd::Portable`] takes the ways of the oldest processor on any processor, so that one machine
-//! can compare both. It belongs to the threads of an engine, which do all of its work.
+//! can compare all. It belongs to the threads of an engine, which do all of its work.
 
 use std::cell::Cell;
 
@@ -15,6 +17,8 @@ pub enum Simd {
     /// The widest registers that the processor has.
     #[default]
     Widest,
+    /// AVX2 at most. For tests.
+    Avx2,
     /// What every processor of the architecture has. For tests.
     Portable,
 }
@@ -24,6 +28,9 @@ thread_local! {
 }
 
 impl Simd {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Widest, Self::Avx2, Self::Portable];
+
     /// Makes this the choice of the calling thread.
     pub(crate) fn enter(self) {
         SIMD.set(self);
@@ -53,7 +60,18 @@ fn with_avx2<R>(work: impl FnOnce() -> R) -> R {
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
 pub(crate) fn has_avx2() -> bool {
-    SIMD.get() == Simd::Widest && is_x86_feature_detected!("avx2")
+    SIMD.get() != Simd::Portable && is_x86_feature_detected!("avx2")
+}
+
+/// Whether kernels of this thread may use AVX-512, with 16-bit lanes and their dot products
+/// (2019 on).
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+pub(crate) fn has_avx512() -> bool {
+    SIMD.get() == Simd::Widest
+        && is_x86_feature_detected!("avx512f")
+        && is_x86_feature_detected!("avx512bw")
+        && is_x86_feature_detected!("avx512vnni")
 }
 
 #[cfg(test)]
@@ -67,7 +85,7 @@ mod tests {
     fn the_choice_of_an_engine_holds_on_all_of_its_threads_and_on_no_other() {
         for threads in [1, 3] {
             let threads = NonZeroUsize::new(threads).unwrap();
-            for simd in [Simd::Portable, Simd::Widest] {
+            for simd in Simd::ALL {
                 let pool = start_pool(threads, simd, || ());
                 let found = pool.broadcast(|_| (SIMD.get(), widest(|| SIMD.get())));
                 assert_eq!(found, vec![(simd, simd); threads.get()]);
@@ -79,10 +97,16 @@ mod tests {
     #[test]
     #[cfg(target_arch = "x86_64")]
     fn wide_registers_are_used_where_the_processor_has_them_and_they_are_not_refused() {
-        let here = is_x86_feature_detected!("avx2");
-        for (simd, expected) in [(Simd::Portable, false), (Simd::Widest, here)] {
+        let avx2 = is_x86_feature_detected!("avx2");
+        let avx512 = is_x86_feature_detected!("avx512bw") && is_x86_feature_detected!("avx512vnni");
+        for (simd, expected) in [
+            (Simd::Portable, [false, false]),
+            (Simd::Avx2, [avx2, false]),
+            (Simd::Widest, [avx2, avx512]),
+        ] {
             let pool = start_pool(NonZeroUsize::MIN, simd, || ());
-            assert_eq!(pool.install(has_avx2), expected, "{simd:?}");
+            let found = pool.install(|| [has_avx2(), has_avx512()]);
+            assert_eq!(found, expected, "{simd:?}");
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Reads a colour plane between its pixels.
 
 #[cfg(target_arch = "x86_64")]
-use std::arch::x86_64::__m256i;
+use std::arch::x86_64::{__m256i, __m512i};
 
 use crate::color::Texel;
 use crate::plane::{Plane, Rect};
@@ -17,6 +17,13 @@ pub trait Positions {
     /// The processor has AVX2, and the run has 8 pixels from `i` on.
     #[cfg(target_arch = "x86_64")]
     unsafe fn eight(&self, i: usize) -> [__m256i; 2];
+
+    /// Where pixels `i` to `i + 15` are read.
+    ///
+    /// # Safety
+    /// The processor has AVX-512 with 16-bit lanes, and the run has 16 pixels from `i` on.
+    #[cfg(target_arch = "x86_64")]
+    unsafe fn sixteen(&self, i: usize) -> [__m512i; 2];
 }
 
 /// Positions that were computed before: x and y of each pixel.
@@ -45,6 +52,20 @@ impl Positions for Listed<'_> {
             unsafe { _mm256_loadu_si256(eight.as_ptr().cast()) }
         };
         [eight(self.xs), eight(self.ys)]
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    unsafe fn sixteen(&self, i: usize) -> [__m512i; 2] {
+        use std::arch::x86_64::_mm512_loadu_si512;
+        let sixteen = |list: &[i32]| -> __m512i {
+            let sixteen: &[i32; 16] =
+                list[i..].first_chunk().expect("the run has 16 pixels from i on");
+            // SAFETY: the caller has AVX-512; 16 values of 32 bits are there, and the load needs
+            // no alignment.
+            unsafe { _mm512_loadu_si512(sixteen.as_ptr().cast()) }
+        };
+        [sixteen(self.xs), sixteen(self.ys)]
     }
 }
 

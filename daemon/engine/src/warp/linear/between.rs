@@ -5,16 +5,19 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
 
 #[cfg(target_arch = "x86_64")]
-use std::arch::x86_64::__m256i;
+use std::arch::x86_64::{__m256i, __m512i};
 
 use super::cpu::Frame;
-use crate::simd::has_avx2;
+#[cfg(target_arch = "x86_64")]
+use crate::simd::{has_avx2, has_avx512};
 use crate::warp::sample::Positions;
 
-/// Pixels of one wide step.
-const LANES: usize = 8;
+/// Pixels of the widest step.
+const LANES: usize = 16;
 
 /// Displacements of the cells of a row, interpolated down to a row of pixels, x and y: anything
 /// around broken cells. The last one is repeated as often as a wide step reads beyond it.
@@ -108,7 +111,10 @@ impl RowPositions<'_> {
     pub(super) fn list(&self, xs: &mut [i32], ys: &mut [i32]) {
         let mut done = 0;
         #[cfg(target_arch = "x86_64")]
-        if has_avx2() && !self.is_finer {
+        if has_avx512() && !self.is_finer {
+            // SAFETY: the processor has AVX-512, asked for just above.
+            done = unsafe { avx512::list(self, xs, ys) };
+        } else if has_avx2() && !self.is_finer {
             // SAFETY: the processor has AVX2, asked for just above.
             done = unsafe { avx2::list(self, xs, ys) };
         }
@@ -132,6 +138,13 @@ impl Positions for RowPositions<'_> {
     unsafe fn eight(&self, i: usize) -> [__m256i; 2] {
         // SAFETY: the caller has AVX2.
         unsafe { avx2::positions(self, i) }
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    unsafe fn sixteen(&self, i: usize) -> [__m512i; 2] {
+        // SAFETY: the caller has AVX-512.
+        unsafe { avx512::positions(self, i) }
     }
 }
 

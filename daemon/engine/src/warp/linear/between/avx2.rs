@@ -10,7 +10,10 @@ use std::arch::x86_64::{
     _mm256_srai_epi32, _mm256_srli_epi32, _mm256_storeu_si256, _mm256_sub_epi32,
 };
 
-use super::{LANES, RowPositions};
+use super::RowPositions;
+
+/// Pixels of one step.
+const LANES: usize = 8;
 
 /// Displacements of the cells of two rows at `phase`, Q12, interpolated `way` of the way from the
 /// first to the second, into `xs` and `ys`, as many as whole steps hold; returns their number.
