@@ -30,6 +30,8 @@ pub struct FieldAxis {
     before: Vec<[u16; 2]>,
     /// The first pixel of each cell, and the end of the last.
     pixels: Vec<u16>,
+    /// Where a cell has 2^n pixels: 8 + n.
+    shift: Option<u32>,
 }
 
 /// Both axes of the map between one valid rectangle and one field grid.
@@ -78,6 +80,9 @@ impl FieldAxis {
             (0..=cells).map(|i| self.cell.partition_point(|cell| u32::from(*cell) < i) as u16),
         );
         self.cell.push(last as u16);
+        let ratio = length / cells;
+        let is_whole = ratio.is_power_of_two() && ratio * cells == length;
+        self.shift = is_whole.then(|| 8 + ratio.trailing_zeros());
     }
 
     /// Number of cells.
@@ -126,6 +131,13 @@ impl FieldAxis {
     #[must_use]
     pub fn cell_of_all(&self) -> &[u16] {
         &self.cell
+    }
+
+    /// Where a cell has 2^n pixels, (2) without a division or a table: the addend and the shift of
+    /// `(256 (p - x) + addend) >> shift`, which is still to be clamped to the grid.
+    #[must_use]
+    pub fn cell_by_shift(&self) -> Option<(i32, u32)> {
+        self.shift.map(|shift| (128 - self.offset, shift))
     }
 
     /// The last cell whose centre is not right of or below pixel `first_pixel + index`, and the
@@ -191,6 +203,24 @@ mod tests {
                 let pixel = (axis.centre(cell) + 128).div_euclid(256).cast_unsigned();
                 assert!((11..11 + length).contains(&pixel), "cell {cell} of {cells}");
             }
+        }
+    }
+
+    #[test]
+    fn cells_of_a_power_of_two_of_pixels_are_found_by_a_shift_and_no_others() {
+        for (length, cells, offset) in
+            [(8, 8, 0), (1920, 960, 0), (64, 16, 77), (64, 32, -700), (6, 3, 513)]
+        {
+            let axis = axis(3, length, cells, offset);
+            let (addend, shift) = axis.cell_by_shift().expect("a power of two of pixels");
+            for index in 0..length {
+                let cell = (256 * index.cast_signed() + addend) >> shift;
+                let cell = cell.clamp(0, cells.cast_signed() - 1).cast_unsigned();
+                assert_eq!(cell, axis.cell_of(index), "{index} of {length}, {cells} cells");
+            }
+        }
+        for (length, cells) in [(9, 3), (853, 427), (7, 2), (5, 8)] {
+            assert_eq!(axis(3, length, cells, 0).cell_by_shift(), None);
         }
     }
 

@@ -15,6 +15,7 @@
 use crate::key::{Acceleration, Velocity};
 use crate::lanes::both;
 use crate::trajectory::dilate_motion::MAX_DISPLACEMENT_PX;
+use crate::trajectory::steps::steps;
 
 /// Displacements of one point from its place at the key, pixels.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
@@ -142,15 +143,6 @@ fn held(one: [f32; 2], v: [f32; 2], a: [f32; 2]) -> ([f32; 2], [f32; 2]) {
     let is_held = fits(v) & fits(a);
     let pick = |part: f32, other: f32| if is_held { part } else { other };
     ([pick(v[0], one[0]), pick(v[1], one[1])], [pick(a[0], 0.0), pick(a[1], 0.0)])
-}
-
-/// 1/32 pixels, rounded half away from zero.
-#[expect(clippy::cast_possible_truncation, reason = "at most 1023 * 32, which fits an i16")]
-#[inline(always)]
-fn steps(px: f32) -> i16 {
-    let scaled = px * 32.0;
-    let magnitude = (scaled.abs() + 0.5) as i32;
-    (if scaled < 0.0 { -magnitude } else { magnitude }) as i16
 }
 
 #[cfg(test)]

@@ -23,5 +23,6 @@ pub mod lattice;
 pub mod models;
 pub mod quadratic;
 pub mod rung;
+mod steps;
 pub mod surface;
 pub mod world;

@@ -9,6 +9,7 @@ use super::{DilateParams, MAX_DISPLACEMENT_PX};
 use crate::bands::{for_each_chunk, for_each_row};
 use crate::key::Velocity;
 use crate::plane::Plane;
+use crate::trajectory::steps::steps;
 
 /// Rows that share what is known of the rows between them.
 const BAND_ROWS: usize = 32;
@@ -138,15 +139,22 @@ fn dilate_row(centres: &[u32], [above, here, below]: [&RowMaxima; 3], velocities
 /// second, where motion is damped.
 #[inline(always)]
 pub fn quantise_row(displacement: &[[f32; 2]], px_per_span: Option<f32>, row: &mut [Velocity]) {
-    let cells = row.iter_mut().zip(displacement);
-    // A loop of its own without damping, which has no call in it.
-    if px_per_span.is_none() {
-        for (velocity, &displacement) in cells {
-            *velocity = quantise(displacement, None);
-        }
-    } else {
-        for (velocity, &displacement) in cells {
+    if px_per_span.is_some() {
+        for (velocity, &displacement) in row.iter_mut().zip(displacement) {
             *velocity = quantise(displacement, px_per_span);
+        }
+        return;
+    }
+    // Without damping both parts go the same way, one after the other.
+    for (row, displacement) in row.chunks_mut(BLOCK).zip(displacement.chunks(BLOCK)) {
+        let mut parts = [0; 2 * BLOCK];
+        for (part, &d) in parts.iter_mut().zip(displacement.as_flattened()) {
+            *part = if d.abs() <= MAX_DISPLACEMENT_PX { steps(d) } else { i16::MIN };
+        }
+        for (velocity, [x, y]) in row.iter_mut().zip(parts.as_chunks::<2>().0) {
+            let is_known = (*x != i16::MIN) & (*y != i16::MIN);
+            let none = |part: i16| if is_known { part } else { i16::MIN };
+            *velocity = Velocity { x: none(*x), y: none(*y) };
         }
     }
 }
@@ -230,20 +238,12 @@ fn nearest_in_3x3(depth: &Plane<u32>, x: u32, y: u32, max: u32) -> (u32, u32) {
 }
 
 /// (3) and (4). `px_per_span` is pixels per span of a speed of one degree per second.
-#[expect(clippy::cast_possible_truncation, reason = "at most 1023 * 32, which fits an i16")]
 #[inline(always)]
 fn quantise([dx, dy]: [f32; 2], px_per_span: Option<f32>) -> Velocity {
     // Written so that NaN fails it, and without a branch.
     let is_known = (dx.abs() <= MAX_DISPLACEMENT_PX) & (dy.abs() <= MAX_DISPLACEMENT_PX);
     let share = px_per_span
         .map_or(1.0, |px_per_span| tracked_share(libm::sqrtf(dx * dx + dy * dy) / px_per_span));
-    let steps = |d: f32| {
-        let scaled = d * share * 32.0;
-        // At most 1023 * 32 where it counts: adding 2^23 moves it into the low bits of the
-        // mantissa. A cast would saturate, one number at a time.
-        let magnitude = ((scaled.abs() + 0.5).floor() + 8_388_608.0).to_bits() as i16;
-        if scaled < 0.0 { magnitude.wrapping_neg() } else { magnitude }
-    };
-    let velocity = Velocity { x: steps(dx), y: steps(dy) };
+    let velocity = Velocity { x: steps(dx * share), y: steps(dy * share) };
     if is_known { velocity } else { Velocity::UNTRACKABLE }
 }

@@ -39,14 +39,12 @@ impl BrokenRow {
         self.older.clear();
         let classes = frame.field.class.row(frame.map.y.cell_of(index_y));
         for (group, classes) in classes.chunks(CLASSES).enumerate() {
-            let is_broken = |class: &CellClass| *class == CellClass::Broken;
-            if !classes.iter().fold(false, |any, class| any | is_broken(class)) {
-                continue;
-            }
-            let cells = (group * CLASSES..).zip(classes);
-            for (cell, _) in cells.filter(|(_, class)| is_broken(class)) {
+            let mut rest = broken_among(classes);
+            while rest != 0 {
+                let cell = group * CLASSES + rest.trailing_zeros() as usize;
                 let pixels = frame.map.x.pixels_of(cell);
                 self.pixels.extend(pixels.map(|column| [column, cell].map(|i| i as u16)));
+                rest &= rest - 1;
             }
         }
         if self.pixels.is_empty() {
@@ -89,6 +87,19 @@ impl BrokenRow {
         let places = &self.places[from..*rest];
         pixels[..count].iter().zip(places).map(|([column, _], place)| (u32::from(*column), *place))
     }
+}
+
+/// Bit `i` is set where cell `i` of at most [`CLASSES`] is broken.
+#[inline(always)]
+fn broken_among(classes: &[CellClass]) -> u32 {
+    #[cfg(target_arch = "x86_64")]
+    if let (Some(classes), true) = (classes.first_chunk(), has_avx2()) {
+        // SAFETY: the processor has AVX2, asked for just above.
+        return unsafe { avx2::broken_among(classes) };
+    }
+    let bits =
+        classes.iter().zip(0..).map(|(class, i)| u32::from(*class == CellClass::Broken) << i);
+    bits.fold(0, |all, bit| all | bit)
 }
 
 /// The holes of a row, from left to right.

@@ -12,6 +12,7 @@ use super::tiles::Window;
 use super::{NO_SOURCE, SOURCE_BITS, shift};
 #[cfg(target_arch = "x86_64")]
 use crate::simd::has_avx2;
+use crate::simd::widest;
 
 /// Columns of a tile.
 const COLUMNS: usize = TILE[0] as usize;
@@ -44,7 +45,10 @@ pub(super) fn look(target: &Target<'_>, window: &Window, splat: &mut [u32]) {
             return;
         }
     }
-    look_anywhere(target, window, splat);
+    widest(
+        #[inline(always)]
+        || look_anywhere(target, window, splat),
+    );
 }
 
 /// The rows of source cells that row `y` of the target looks at.
@@ -55,6 +59,7 @@ fn source_rows(target: &Target<'_>, window: &Window, y: u32) -> Range<u32> {
 }
 
 /// [`look`] at and beyond the border of the grid too.
+#[inline(always)]
 fn look_anywhere(target: &Target<'_>, window: &Window, splat: &mut [u32]) {
     let size = [target.source.velocity.width(), target.source.velocity.height()];
     let columns = target.start[0] as usize..target.end[0] as usize;
@@ -123,6 +128,7 @@ struct Row {
 
 impl Candidates {
     /// Fills `places` and raises `top` to the largest depth key.
+    #[inline(always)]
     fn update(
         &mut self,
         target: &Target<'_>,
@@ -134,17 +140,17 @@ impl Candidates {
         let first = row.y * source.velocity.width() + row.first as u32;
         let velocities = &source.velocity.row(row.y)[row.first..][..places.len()];
         let depths = &source.depth.row(row.y)[row.first..][..places.len()];
-        let found = self.depth[places.clone()].iter_mut().zip(&mut self.rank[places.clone()]);
-        let sources = velocities.iter().zip(depths).zip(first..);
-        for ((top, (found, rank)), ((v, &depth), cell)) in
-            top[places].iter_mut().zip(found).zip(sources)
-        {
+        let found = &mut self.depth[places.clone()][..velocities.len()];
+        let ranks = &mut self.rank[places.clone()][..velocities.len()];
+        let top = &mut top[places][..velocities.len()];
+        for i in 0..velocities.len() {
+            let (v, depth, cell) = (velocities[i], depths[i], first + i as u32);
             let x = (row.away[0] + shift(v.x, target.scale[0])).unsigned_abs();
             let y = (row.away[1] + shift(v.y, target.scale[1])).unsigned_abs();
             let lands = (x | y) < 256;
-            *found = if lands { depth } else { 0 };
-            *rank = if lands { ((x + y) >> 2 << SOURCE_BITS) | cell } else { NO_SOURCE };
-            *top = (*top).max(*found);
+            found[i] = if lands { depth } else { 0 };
+            ranks[i] = if lands { ((x + y) >> 2 << SOURCE_BITS) | cell } else { NO_SOURCE };
+            top[i] = top[i].max(found[i]);
         }
     }
 }

@@ -5,19 +5,20 @@
 //! The caller asks the processor whether it has AVX2.
 
 use std::arch::x86_64::{
-    __m256i, _mm256_abs_epi32, _mm256_add_epi32, _mm256_and_si256, _mm256_andnot_si256,
-    _mm256_cmpeq_epi32, _mm256_cmpgt_epi32, _mm256_i32gather_epi32, _mm256_loadu_si256,
-    _mm256_madd_epi16, _mm256_max_epi32, _mm256_max_epu32, _mm256_min_epi32, _mm256_min_epu32,
-    _mm256_mullo_epi32, _mm256_or_si256, _mm256_set1_epi32, _mm256_setzero_si256,
-    _mm256_slli_epi32, _mm256_srai_epi32, _mm256_srli_epi32, _mm256_sub_epi32,
+    __m256i, _mm_cvtsi32_si128, _mm256_abs_epi32, _mm256_add_epi32, _mm256_and_si256,
+    _mm256_andnot_si256, _mm256_cmpeq_epi32, _mm256_cmpgt_epi32, _mm256_i32gather_epi32,
+    _mm256_loadu_si256, _mm256_madd_epi16, _mm256_max_epi32, _mm256_max_epu32, _mm256_min_epi32,
+    _mm256_min_epu32, _mm256_movemask_epi8, _mm256_mullo_epi32, _mm256_or_si256, _mm256_set1_epi32,
+    _mm256_setzero_si256, _mm256_slli_epi16, _mm256_slli_epi32, _mm256_sra_epi32,
+    _mm256_srai_epi32, _mm256_srli_epi32, _mm256_sub_epi32,
 };
 
-use super::{Holes, NEIGHBOURS};
+use super::{CLASSES, Holes, NEIGHBOURS};
 use crate::field::FieldAxis;
 use crate::key::Velocity;
 use crate::plane::Plane;
 use crate::warp::linear::cpu::Frame;
-use crate::warp::resolve::HOLE;
+use crate::warp::resolve::{CellClass, HOLE};
 
 /// Pixels of one step.
 const LANES: usize = 8;
@@ -37,6 +38,15 @@ struct Judged {
     depth: __m256i,
     /// The error, with the number of the candidate below it. All ones where it does not come.
     rank: __m256i,
+}
+
+/// [`super::broken_among`].
+#[target_feature(enable = "avx2")]
+pub(super) fn broken_among(classes: &[CellClass; CLASSES]) -> u32 {
+    const { assert!(CellClass::Smooth as u8 == 0 && CellClass::Broken as u8 == 1) };
+    // SAFETY: there are 32 classes of 8 bits, and the load needs no alignment.
+    let classes = unsafe { _mm256_loadu_si256(classes.as_ptr().cast()) };
+    _mm256_movemask_epi8(_mm256_slli_epi16(classes, 7)).cast_unsigned()
 }
 
 /// Where `pixels` (column and cell) of row `index_y` are read, appended to `places`.
@@ -188,10 +198,16 @@ fn pixel(axis: &FieldAxis, start: u32, q: __m256i) -> (__m256i, __m256i) {
     (clamped, _mm256_cmpeq_epi32(clamped, pixel))
 }
 
-/// The cells that hold pixels of an axis.
+/// The cells that hold pixels of an axis, which were clamped to it.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn cell_of(axis: &FieldAxis, pixel: __m256i) -> __m256i {
+    if let Some((addend, shift)) = axis.cell_by_shift() {
+        let place = _mm256_add_epi32(_mm256_slli_epi32(pixel, 8), _mm256_set1_epi32(addend));
+        let cell = _mm256_sra_epi32(place, _mm_cvtsi32_si128(shift.cast_signed()));
+        let last = _mm256_set1_epi32(axis.cells().cast_signed() - 1);
+        return _mm256_min_epi32(_mm256_max_epi32(cell, _mm256_setzero_si256()), last);
+    }
     let table = axis.cell_of_all();
     assert!(table.len() > axis.pixels() as usize, "one entry more than pixels");
     // SAFETY: pixels were clamped to the axis. The table has an entry of 2 bytes for each of them
