@@ -134,6 +134,19 @@ mod tests {
     }
 
     #[test]
+    fn blur_of_the_whole_picture_is_refused_without_finishing() {
+        for command in [&["replay", "file.mcap"][..], &["score", "file.mcap"]] {
+            let parse = |more: &[&str]| {
+                Cli::try_parse_from([&["foreframe"], command, more].concat()).map(|_| ())
+            };
+            let said = parse(&["--finish-whole"]).expect_err("nothing is finished").to_string();
+            assert!(said.contains("--finish <"), "{said}");
+            parse(&["--finish", "on", "--finish-whole"]).expect("it is finished");
+            parse(&[]).expect("it is not finished");
+        }
+    }
+
+    #[test]
     fn every_command_line_of_the_readme_is_one_that_exists() {
         let commands = commands(include_str!("../../README.md"));
         assert!(commands.len() >= 7, "found {}", commands.len());

@@ -48,18 +48,35 @@ pub struct Args {
     #[arg(long, default_value_t = SinkSpec::Shm, value_parser = parse_sink)]
     pub sink: SinkSpec,
     /// With --sink window: as large as the monitor
-    #[arg(long)]
+    #[arg(long, requires = "sink")]
     pub fullscreen: bool,
     /// With --sink window: the monitor, by its name
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", requires = "sink")]
     pub monitor: Option<String>,
     /// With --sink window: what to draw into the pictures, as for `foreframed`; `h` in the window
     /// goes through the views
-    #[arg(long, value_name = "VIEW", default_value_t = HudView::Off)]
+    #[arg(long, value_name = "VIEW", default_value_t = HudView::Off, requires = "sink")]
     pub hud: HudView,
     /// Folder for the pictures and the numbers
     #[arg(long, value_name = "DIR", default_value = "foreframe-demo")]
     pub out: PathBuf,
+}
+
+impl Args {
+    /// What is for a window needs one.
+    fn check(&self) -> anyhow::Result<()> {
+        let of_a_window = [
+            ("--fullscreen", self.fullscreen),
+            ("--monitor", self.monitor.is_some()),
+            ("--hud", self.hud != HudView::Off),
+        ];
+        match of_a_window.into_iter().find(|(_, is_given)| *is_given) {
+            Some((name, _)) if self.sink != SinkSpec::Window => {
+                anyhow::bail!("{name}: expected --sink window with it, found --sink {}", self.sink)
+            }
+            _ => Ok(()),
+        }
+    }
 }
 
 /// Runs the command.
@@ -67,6 +84,7 @@ pub struct Args {
 /// # Errors
 /// If the daemon does not start, or a file cannot be written.
 pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
+    args.check()?;
     let settings = Settings {
         scene: args.scene,
         size: args.size,
@@ -105,4 +123,39 @@ fn parse_size(text: &str) -> Result<Size, String> {
         side.parse().ok().filter(|side| (16..=Size::MAX).contains(side)).ok_or_else(fail)
     };
     Ok(Size::new(side(width)?, side(height)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser as _;
+
+    use super::*;
+
+    #[derive(clap::Parser, Debug)]
+    struct Command {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    fn refused(words: &[&str]) -> Option<String> {
+        let words = ["demo"].iter().chain(words);
+        match Command::try_parse_from(words) {
+            Err(error) => Some(error.to_string()),
+            Ok(Command { args }) => args.check().err().map(|error| error.to_string()),
+        }
+    }
+
+    #[test]
+    fn what_is_for_a_window_is_refused_without_one() {
+        for of_a_window in [&["--fullscreen"][..], &["--monitor", "DP-1"], &["--hud", "stats"]] {
+            let said = refused(of_a_window).expect("there is no window");
+            assert!(said.contains("--sink"), "{said}");
+            let elsewhere = [of_a_window, &["--sink", "png:frames"]].concat();
+            let said = refused(&elsewhere).expect("there is no window");
+            assert!(said.contains("found --sink png:frames"), "{said}");
+            assert_eq!(refused(&[of_a_window, &["--sink", "window"]].concat()), None);
+        }
+        assert_eq!(refused(&[]), None);
+        assert_eq!(refused(&["--sink", "png:frames"]), None);
+    }
 }

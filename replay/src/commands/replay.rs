@@ -55,7 +55,7 @@ pub struct Args {
     pub finish: FinishMode,
     /// With --finish, blur all of an in-between frame, not only where its motion is not to be
     /// relied on; sharper where things move.
-    #[arg(long)]
+    #[arg(long, requires = "finish")]
     pub finish_whole: bool,
     /// Leave out in-between frames until something has moved by so many pixels, 0 to 16.
     #[arg(long, value_name = "PX", default_value_t = 0.0, value_parser = number(0.0, 16.0))]

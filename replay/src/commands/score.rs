@@ -52,7 +52,7 @@ pub struct Args {
     pub finish: FinishMode,
     /// With --finish, blur all of an in-between frame, not only where its motion is not to be
     /// relied on; sharper where things move.
-    #[arg(long)]
+    #[arg(long, requires = "finish")]
     pub finish_whole: bool,
     /// Compare what an eye that follows the motion sees, too: of the frames, of the keys alone, and
     /// of the true frames.
