@@ -41,6 +41,12 @@ pub(super) fn content_judder(frames: &[Shown], refresh_interval: MonoSpan) -> Op
     Some((squares / count).sqrt())
 }
 
+/// What a refresh without a bar in the timeline is, if there are any.
+pub(super) fn meaning_of_gaps(frames: &[Shown]) -> &'static str {
+    let received_all = frames.windows(2).all(|pair| pair[0].not_received == pair[1].not_received);
+    if received_all { "" } else { "; no bar: not received" }
+}
+
 /// Every refresh that is known, in order: when it was, what it showed, and of which content time.
 /// Refreshes without a new picture are of kind `unshown`.
 fn refreshes(
@@ -168,6 +174,8 @@ mod tests {
         let mut frames = shown(&[(0, 0), (3, 30)]);
         frames[1].not_received = 2;
         assert_eq!(refreshes(&frames, INTERVAL, PresentKind::Repeated).len(), 2);
+        assert_eq!(meaning_of_gaps(&frames), "; no bar: not received");
+        assert_eq!(meaning_of_gaps(&shown(&[(0, 0), (3, 30)])), "", "all were received");
     }
 
     #[test]

@@ -14,7 +14,7 @@ use serde::Serialize;
 use super::Settings;
 use super::application::Submissions;
 use super::audience::{Kept, ROW_STEP, Seen, Shown, psnr_rgb_db};
-use super::refreshes::{content_judder, timeline_events};
+use super::refreshes::{content_judder, meaning_of_gaps, timeline_events};
 use super::rehearsal::Rehearsal;
 use crate::draw::Rgba8Image;
 use crate::pictures::{ContactSheetRow, PresentKind, contact_sheet, timeline};
@@ -234,8 +234,12 @@ impl Summary {
         );
         if !events.is_empty() {
             let title = format!(
-                "{} at {} Hz to {} Hz, {}",
-                self.scene, self.key_rate_hz, self.refresh_hz, self.method
+                "{} at {} Hz to {} Hz, {}{}",
+                self.scene,
+                self.key_rate_hz,
+                self.refresh_hz,
+                self.method,
+                meaning_of_gaps(&seen.frames)
             );
             save(&timeline(&title, &events)?, &out.join(TIMELINE))?;
             self.pictures.push(TIMELINE);
