@@ -8,10 +8,9 @@ use std::fs;
 use std::path::PathBuf;
 
 use compositors::{Compositor, Kind};
-use daemon_fixture::child::{BACKEND, ChildProcess, run_if_asked};
+use daemon_fixture::child::{BACKEND, ChildProcess, lavapipe, run_if_asked};
 use daemon_fixture::{Client, KeySource, private_folder};
 use foreframe_engine::MonoSpan;
-use foreframe_engine::backend::gpu::test_adapters::test_adapters;
 use foreframe_protocol::{DaemonMessage, DestroyStream, Presented};
 use foreframed::clock;
 use tempfile::TempDir;
@@ -161,17 +160,6 @@ fn on_x11_frames_are_paced_by_a_timer_and_that_is_said() {
     let log = stage.log();
     assert!(log.contains("pacing=\"timer\""), "{log}");
     stage.strike();
-}
-
-/// The adapter that presents without a GPU, as a backend; None, and a word of it, where it is not
-/// installed.
-fn lavapipe() -> Option<&'static str> {
-    let name = std::thread::current().name().unwrap_or_default().to_owned();
-    let found = test_adapters(&name).iter().any(|it| it.facts.name.contains("llvmpipe"));
-    if !found {
-        eprintln!("skipped (1): {name}: no llvmpipe");
-    }
-    found.then_some("gpu:llvmpipe")
 }
 
 /// Shows keys through a surface, which stays the way.

@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use crate::backend::fallback::Backend;
-use crate::backend::gpu::Gpu;
+use crate::backend::fallback::{Backend, Made};
+use crate::backend::gpu::{Gpu, GpuPicture};
 use crate::backend::{BackendStatus, FrameInput};
 use crate::color::ColorPlane;
 use crate::decode::{DecodeError, DecodeScratch, decode_key};
@@ -391,7 +391,20 @@ impl Engine {
         out: &mut ColorPlane,
     ) -> Option<FrameReport> {
         let pool = Arc::clone(&self.pool);
-        pool.install(|| self.make(content_time, out))
+        let made = pool.install(|| self.make(content_time, out, false));
+        made.map(|(report, _)| report)
+    }
+
+    /// The same for who reads the picture on the GPU that makes it: there it stays, and `out` is
+    /// unspecified. Where it is not made on a GPU, or something comes over it, it is in `out`.
+    pub fn synthesise_kept(
+        &mut self,
+        content_time: MonoTime,
+        out: &mut ColorPlane,
+    ) -> Option<(FrameReport, Option<GpuPicture>)> {
+        let pool = Arc::clone(&self.pool);
+        let keeps = self.ui.is_empty();
+        pool.install(|| self.make(content_time, out, keeps))
     }
 
     /// Whether a picture of a content time that has just been shown would be another one now,
@@ -409,7 +422,12 @@ impl Engine {
         }
     }
 
-    fn make(&mut self, content_time: MonoTime, out: &mut ColorPlane) -> Option<FrameReport> {
+    fn make(
+        &mut self,
+        content_time: MonoTime,
+        out: &mut ColorPlane,
+        keeps: bool,
+    ) -> Option<(FrameReport, Option<GpuPicture>)> {
         let started_at = (self.config.timer)();
         self.catch_up();
         let key = self.newest.as_ref()?;
@@ -437,23 +455,26 @@ impl Engine {
         let is_after = shown.is_none() && !self.config.method.interpolates();
         let moved = if is_after { phase } else { Phase::ZERO };
         let part = self.finish.as_mut().map(|finish| finish.next_part(moved));
-        let is_finished = if let Some(shown) = shown {
+        let Made { is_finished, kept } = if let Some(shown) = shown {
             out.copy_from(&shown.color);
-            false
+            Made { is_finished: false, kept: None }
         } else {
             let method = self.config.method.warp();
             let map = &self.scratch.map;
             let finish = self.finish.as_mut().zip(part).and_then(|(it, part)| it.split(part));
             let frame = FrameInput { method, phase, newest: key, previous, map, finish };
-            self.backend.make(&self.pool, &frame, out)
+            self.backend.make(&self.pool, &frame, out, keeps)
         };
         if let Some((finish, part)) = self.finish.as_mut().zip(part).filter(|_| !is_finished) {
             finish.apply(&self.pool, part, key.valid, out);
         }
-        composite(&self.pool, &self.ui, out);
+        if kept.is_none() {
+            composite(&self.pool, &self.ui, out);
+        }
         // What lies before the newest key has no position after it.
         let phase = if self.config.method.interpolates() { Phase::ZERO } else { phase };
-        Some(FrameReport { key_index: key.index, phase, work: (self.config.timer)() - started_at })
+        let work = (self.config.timer)() - started_at;
+        Some((FrameReport { key_index: key.index, phase, work }, kept))
     }
 }
 

@@ -247,12 +247,12 @@ mod tests {
 
     #[test]
     fn primaries_there_and_back_are_the_same() {
-        for (at, row) in bt2020_from(Primaries::Bt709).iter().enumerate() {
-            for column in 0..3 {
-                let product: f32 = (0..3).map(|k| row[k] * BT709_FROM_BT2020[k][column]).sum();
-                let expected = if at == column { 1.0 } else { 0.0 };
-                assert!((product - expected).abs() < 1e-4, "{at} {column}: {product}");
-            }
+        for (at, row) in bt2020_from(Primaries::Bt709).into_iter().enumerate() {
+            let column = |column: usize| BT709_FROM_BT2020.map(|row| row[column]);
+            let product: [f32; 3] =
+                [0, 1, 2].map(|it| row.iter().zip(column(it)).map(|(a, b)| a * b).sum());
+            let off: [f32; 3] = [0, 1, 2].map(|it| if it == at { 1.0 } else { 0.0 } - product[it]);
+            assert!(off.iter().all(|off| off.abs() < 1e-4), "{at}: {product:?}");
         }
         let through = bt2020_from(Primaries::DisplayP3);
         assert!((through[0][0] - 0.753_83).abs() < 1e-3, "{through:?}");

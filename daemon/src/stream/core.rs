@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use foreframe_engine::backend::BackendStatus;
-use foreframe_engine::backend::gpu::Gpu;
+use foreframe_engine::backend::gpu::{Gpu, GpuPicture};
 use foreframe_engine::inspect::Inspection;
 use foreframe_engine::pacing::{
     Pacer, PacerConfig, PacerStatus, Plan, RefreshKind, TimerDisplay, WorkEstimate,
@@ -104,6 +104,14 @@ pub struct FrameCounts {
     pub dropped: u64,
 }
 
+/// What a picture that was handed over counts as.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Counted {
+    New(FrameKind),
+    /// The one before again, for a window that has changed.
+    Repeated,
+}
+
 /// Where pictures are shown.
 #[derive(Clone, Copy, Debug)]
 enum Display {
@@ -157,8 +165,12 @@ pub struct StreamCore {
     pacer: Pacer,
     display: Display,
     /// Pictures that were handed to a display that will tell what became of them, oldest first.
-    under_way: VecDeque<(MonoTime, FrameKind)>,
+    under_way: VecDeque<(MonoTime, Counted)>,
     frame: ColorPlane,
+    /// Whether pictures may stay on the GPU that makes them.
+    keeps: bool,
+    /// The picture that was made last, if it did.
+    kept: Option<GpuPicture>,
     counts: FrameCounts,
     least_step_px: f32,
     newest_key: Option<NewestKey>,
@@ -205,8 +217,10 @@ struct Shown {
     index: u64,
     presented_at: MonoTime,
     content_time: MonoTime,
-    /// Keys taken in when it was made. 0 if it is to be shown again whatever comes.
+    /// Keys taken in when it was made. 0 if the display does not have it.
     keys: u64,
+    /// Whether the display has it otherwise than it is to be.
+    is_misplaced: bool,
     /// User interfaces taken in when it was made.
     uis: u64,
 }
@@ -223,6 +237,8 @@ impl StreamCore {
             display: Display::Timer(TimerDisplay::new(display_origin, refresh_interval)),
             under_way: VecDeque::new(),
             frame: ColorPlane::new(format.color, format.width, format.height),
+            keeps: false,
+            kept: None,
             counts: FrameCounts::default(),
             least_step_px: config.least_step_px,
             newest_key: None,
@@ -375,10 +391,9 @@ impl StreamCore {
         let content_time = self.shown_content_time(plan.content_time?, &key);
         self.pacer.start(plan);
         let asked = (content_time, key.taken, self.ui.taken);
-        let is_shown_already =
-            self.shown.is_some_and(|shown| (shown.content_time, shown.keys, shown.uis) == asked)
-                && !self.engine.alternates();
-        if is_shown_already {
+        let same = |shown: &Shown| (shown.content_time, shown.keys, shown.uis) == asked;
+        let shown_already = self.shown.filter(same).filter(|_| !self.engine.alternates());
+        if shown_already.is_some_and(|shown| !shown.is_misplaced) {
             if let Display::Timer(_) = self.display {
                 self.pacer.on_presented(plan.present_at, plan.present_at, plan.present_at);
             }
@@ -386,11 +401,25 @@ impl StreamCore {
             return Some(FrameOutcome::Repeated);
         }
         let started_at = clock();
-        let report = self.engine.synthesise(content_time, &mut self.frame)?;
+        let report = match self.keeps {
+            true => {
+                let (report, kept) = self.engine.synthesise_kept(content_time, &mut self.frame)?;
+                self.kept = kept;
+                report
+            }
+            false => {
+                self.kept = None;
+                self.engine.synthesise(content_time, &mut self.frame)?
+            }
+        };
         let ready_at = clock();
         // A head start that was not used took nobody's time.
         self.pacer.on_work(ready_at - plan.wake_by.min(started_at));
         let kind = self.kind(content_time, report.phase, &key);
+        let counted = match shown_already {
+            Some(_) => Counted::Repeated,
+            None => Counted::New(kind),
+        };
         let presented_at = match self.display {
             Display::Timer(timer) => timer.refresh_at_or_after(ready_at),
             // Late for the deadline as it is known is not late for sure.
@@ -414,19 +443,21 @@ impl StreamCore {
                 if self.under_way.len() == UNDER_WAY {
                     self.under_way.pop_front();
                 }
-                self.under_way.push_back((plan.present_at, kind));
+                self.under_way.push_back((plan.present_at, counted));
             }
         }
-        match kind {
-            FrameKind::Real => self.counts.real += 1,
-            FrameKind::Synthesised => self.counts.synthesised += 1,
+        match counted {
+            Counted::New(FrameKind::Real) => self.counts.real += 1,
+            Counted::New(FrameKind::Synthesised) => self.counts.synthesised += 1,
+            Counted::Repeated => self.counts.repeated += 1,
         }
         let (index, repeats_before) = self.shown.map_or((0, 0), |shown| {
             let refreshes = self.refreshes(presented_at - shown.presented_at);
             (shown.index + refreshes, refreshes - 1)
         });
         let (keys, uis) = (key.taken, self.ui.taken);
-        self.shown = Some(Shown { index, presented_at, content_time, keys, uis });
+        let is_misplaced = false;
+        self.shown = Some(Shown { index, presented_at, content_time, keys, is_misplaced, uis });
         Some(FrameOutcome::Presented(PresentedFrame {
             index,
             key_index: key.index,
@@ -476,7 +507,7 @@ impl StreamCore {
             }
             Told::Visible(is_visible) => self.pacer.on_visibility(is_visible),
             Told::Moved => {
-                self.shown = self.shown.map(|shown| Shown { keys: 0, ..shown });
+                self.shown = self.shown.map(|shown| Shown { is_misplaced: true, ..shown });
                 self.pacer.on_news();
             }
         }
@@ -486,23 +517,25 @@ impl StreamCore {
     /// does not have the one before, or not as it is to be.
     #[must_use]
     pub fn is_to_show_again(&self) -> bool {
-        self.shown.is_some_and(|shown| shown.keys == 0)
+        self.shown.is_some_and(|shown| shown.keys == 0 || shown.is_misplaced)
     }
 
     /// The picture for `planned` was counted as shown, and was not.
     fn count_discarded(&mut self, planned: MonoTime) {
-        // What was made for it is not on the display, and is worth another try.
-        self.shown = self.shown.map(|shown| match shown.presented_at == planned {
-            true => Shown { keys: 0, ..shown },
-            false => shown,
-        });
         let position = self.under_way.iter().position(|&(waiting, _)| waiting == planned);
-        let Some((_, kind)) = position.and_then(|position| self.under_way.remove(position)) else {
-            return;
-        };
-        match kind {
-            FrameKind::Real => self.counts.real -= 1,
-            FrameKind::Synthesised => self.counts.synthesised -= 1,
+        let counted = position.and_then(|position| self.under_way.remove(position));
+        let counted = counted.map(|(_, counted)| counted);
+        // What was made for it is not on the display, and is worth another try.
+        self.shown = self.shown.map(|shown| match (shown.presented_at == planned, counted) {
+            (true, Some(Counted::Repeated)) => Shown { is_misplaced: true, ..shown },
+            (true, _) => Shown { keys: 0, ..shown },
+            (false, _) => shown,
+        });
+        match counted {
+            Some(Counted::New(FrameKind::Real)) => self.counts.real -= 1,
+            Some(Counted::New(FrameKind::Synthesised)) => self.counts.synthesised -= 1,
+            // The display shows that picture all the same.
+            Some(Counted::Repeated) | None => return,
         }
         self.counts.dropped += 1;
     }
@@ -520,6 +553,17 @@ impl StreamCore {
     /// takes it before the next is made, and may leave any other in its place.
     pub fn frame(&mut self) -> &mut ColorPlane {
         &mut self.frame
+    }
+
+    /// Whether pictures stay on the GPU that makes them, where one does, from now on.
+    pub fn keep_pictures(&mut self, keeps: bool) {
+        self.keeps = keeps;
+    }
+
+    /// The picture that was made last, if it stayed on its GPU: then [`frame`](Self::frame) is any
+    /// other.
+    pub fn kept(&mut self) -> &mut Option<GpuPicture> {
+        &mut self.kept
     }
 
     /// What became of the refreshes so far, up to the last plan or [`finish`](Self::finish).

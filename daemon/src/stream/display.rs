@@ -70,7 +70,10 @@ impl WindowDisplay {
     pub(super) fn show(&mut self, plan: &Plan, frame: &PresentedFrame, core: &mut StreamCore) {
         let is_taken = if self.hud.view() == HudView::Off {
             clock::sleep_until(plan.submit_from);
-            self.window.present(plan.present_at, core.frame())
+            match core.kept().take() {
+                Some(picture) => self.window.present_kept(plan.present_at, picture),
+                None => self.window.present(plan.present_at, core.frame()),
+            }
         } else {
             self.draw_hud(frame, core);
             clock::sleep_until(plan.submit_from);
@@ -85,6 +88,11 @@ impl WindowDisplay {
             "handed over"
         );
         core.on_handed_over(plan, now, is_taken);
+    }
+
+    /// Whether pictures can be shown that stay on the GPU that makes them.
+    pub(super) fn takes_kept_pictures(&self) -> bool {
+        self.hud.view() == HudView::Off && self.window.takes_kept_pictures()
     }
 
     /// Copies the picture that was just made and draws the HUD into it. Frames of a kind that the

@@ -342,6 +342,7 @@ impl StreamThread {
             }
             self.core.late_camera(MonoTime::from_ns(pose.content_time_ns), pose.view);
         }
+        self.core.keep_pictures(self.window_alone_takes_pictures());
         let outcome = self.core.make(plan, clock::now);
         self.watch_backend();
         let Some(outcome) = outcome else { return };
@@ -358,10 +359,14 @@ impl StreamThread {
             FrameOutcome::Presented(frame) => {
                 trace!(?frame, "frame presented");
                 self.repeats_in_a_row = 0;
+                let is_here = self.core.kept().is_none();
                 if let Some(window) = &mut self.window {
                     window.show(plan, &frame, &mut self.core);
                 }
-                self.deliver(&frame, ready_at);
+                if is_here {
+                    self.deliver(&frame);
+                }
+                self.on_presented(&frame, ready_at);
             }
         }
         if self.statistics_due_at <= plan.present_at {
@@ -408,8 +413,15 @@ impl StreamThread {
         }
     }
 
-    fn deliver(&mut self, frame: &PresentedFrame, ready_at: MonoTime) {
-        self.add_work(frame.kind, frame.work);
+    /// Whether nobody needs the next picture in memory.
+    fn window_alone_takes_pictures(&self) -> bool {
+        self.window.as_ref().is_some_and(WindowDisplay::takes_kept_pictures)
+            && self.parts.sink.is_none()
+            && self.parts.mailbox.outlets().is_empty()
+    }
+
+    /// Gives the picture to who else gets it.
+    fn deliver(&mut self, frame: &PresentedFrame) {
         let phase_q12 = frame.phase.q12().unsigned_abs();
         for outlet in self.parts.mailbox.outlets().iter() {
             let Some((slot, skipped)) = outlet.write(self.core.frame()) else { continue };
@@ -434,6 +446,11 @@ impl StreamThread {
             sink.repeat(frame.repeats_before);
             sink.offer(frame.index, self.core.frame());
         }
+    }
+
+    fn on_presented(&mut self, frame: &PresentedFrame, ready_at: MonoTime) {
+        self.add_work(frame.kind, frame.work);
+        let phase_q12 = frame.phase.q12().unsigned_abs();
         if let Some(key) = self.unshown.take_if(|key| key.key_index == frame.key_index) {
             self.observed.key_shown(&key.instants, ready_at, frame.presented_at);
             let presented = Presented {

@@ -9,6 +9,7 @@ use std::path::Path;
 use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
 
 use foreframe_engine::MonoSpan;
+use foreframe_engine::backend::gpu::test_adapters::test_adapters;
 use foreframed::{Args, clock};
 use rustix::process::{Pid, Signal, kill_process};
 
@@ -101,6 +102,17 @@ fn wait_for_the_end() -> i32 {
     println!("{READY}");
     drop(std::io::stdin().read(&mut [0]));
     0
+}
+
+/// The adapter that presents without a GPU, as a backend; None, and a word of it, where it is not
+/// installed.
+pub(crate) fn lavapipe() -> Option<&'static str> {
+    let name = std::thread::current().name().unwrap_or_default().to_owned();
+    let found = test_adapters(&name).iter().any(|it| it.facts.name.contains("llvmpipe"));
+    if !found {
+        eprintln!("skipped (1): {name}: no llvmpipe");
+    }
+    found.then_some("gpu:llvmpipe")
 }
 
 impl ChildProcess {

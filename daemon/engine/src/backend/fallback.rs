@@ -11,7 +11,7 @@ use rayon::ThreadPool;
 
 use super::FrameInput;
 use super::cpu::CpuBackend;
-use super::gpu::{Gpu, GpuBackend, GpuError};
+use super::gpu::{Gpu, GpuBackend, GpuError, GpuPicture};
 use crate::color::{ColorFormat, ColorPlane};
 use crate::field::FieldMap;
 use crate::key::KeyFrame;
@@ -30,6 +30,15 @@ impl Default for BackendStatus {
     fn default() -> Self {
         Self { name: "cpu".to_owned(), fell_back: None }
     }
+}
+
+/// A picture that was made.
+#[derive(Debug)]
+pub(crate) struct Made {
+    /// Whether it is finished already.
+    pub(crate) is_finished: bool,
+    /// Where it is, if it stayed on a device.
+    pub(crate) kept: Option<GpuPicture>,
 }
 
 /// The backend of one stream.
@@ -109,16 +118,17 @@ impl Backend {
     }
 
     /// Makes a picture after the key that was taken last into `out`, which has the size and format
-    /// of the keys. Whether it is finished already.
+    /// of the keys. One that a device `keeps` stays there, and `out` is unspecified.
     pub(crate) fn make(
         &mut self,
         pool: &ThreadPool,
         frame: &FrameInput<'_>,
         out: &mut ColorPlane,
-    ) -> bool {
+        keeps: bool,
+    ) -> Made {
         if let Some(gpu) = &mut self.gpu {
-            match gpu.make(frame, out) {
-                Ok(()) => return true,
+            match gpu.make(frame, out, keeps) {
+                Ok(kept) => return Made { is_finished: true, kept },
                 Err(error) => {
                     self.fall(&error);
                     self.cpu.take_key(pool, frame.method, frame.newest);
@@ -126,7 +136,7 @@ impl Backend {
             }
         }
         self.cpu.make(pool, frame, out);
-        false
+        Made { is_finished: false, kept: None }
     }
 
     fn fall(&mut self, error: &GpuError) {

@@ -59,6 +59,10 @@ impl Gpu {
     }
 }
 
+/// A picture on a device. None exists.
+#[derive(Debug)]
+pub struct GpuPicture(Never);
+
 /// A stream on a device. None exists.
 #[derive(Debug)]
 pub(crate) struct GpuBackend(Never);
@@ -81,7 +85,12 @@ impl GpuBackend {
         match self.0 {}
     }
 
-    pub(crate) fn make(&mut self, _: &FrameInput<'_>, _: &mut ColorPlane) -> Result<(), GpuError> {
+    pub(crate) fn make(
+        &mut self,
+        _: &FrameInput<'_>,
+        _: &mut ColorPlane,
+        _: bool,
+    ) -> Result<Option<GpuPicture>, GpuError> {
         match self.0 {}
     }
 }

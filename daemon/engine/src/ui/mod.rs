@@ -54,6 +54,12 @@ pub struct UiLayer {
 }
 
 impl UiLayer {
+    /// Whether nothing has come yet.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.pixels.as_bytes().is_empty()
+    }
+
     /// Takes over what `input` shows, which has pixels of `format`.
     ///
     /// # Errors

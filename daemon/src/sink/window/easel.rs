@@ -51,6 +51,18 @@ impl<M> Easel<M> {
         replaced
     }
 
+    /// Leaves a picture that is in what is known of it; what is taken beside that is any other.
+    pub(super) fn leave_known(&self, known: M) -> Option<M> {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let (replaced, memory) = match state.next.take() {
+            Some((replaced, memory)) => (Some(replaced), memory),
+            None => (None, state.spare.take().unwrap_or_default()),
+        };
+        state.next = Some((known, memory));
+        self.changed.notify_one();
+        replaced
+    }
+
     /// Waits for the next picture; None when there will be none. Gives back one that was drawn.
     pub(super) fn take(&self, drawn: Option<ColorPlane>) -> Option<(M, ColorPlane)> {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);

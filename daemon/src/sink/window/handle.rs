@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use foreframe_engine::backend::gpu::Gpu;
+use foreframe_engine::backend::gpu::{Gpu, GpuPicture};
 use foreframe_engine::{ColorPlane, MonoSpan, MonoTime, StreamFormat};
 use tracing::{info, warn};
 use winit::window::WindowId;
@@ -129,6 +129,25 @@ impl Window {
             Surface::Wayland(surface) => surface.present(planned, frame),
             Surface::Software(painter) => painter.present(frame),
             Surface::Gpu(_) | Surface::None => false,
+        }
+    }
+
+    /// Whether a GPU draws, so that pictures need not leave it.
+    #[must_use]
+    pub fn takes_kept_pictures(&self) -> bool {
+        matches!(self.surface, Surface::Gpu(_))
+    }
+
+    /// The same as [`present`](Self::present) for a picture that has stayed on the GPU.
+    pub fn present_kept(&mut self, planned: MonoTime, picture: GpuPicture) -> bool {
+        let Surface::Gpu(surface) = &self.surface else { return false };
+        match surface.present_kept(planned, picture) {
+            Ok(()) => !self.shared.is_closed(),
+            Err(why) => {
+                // This picture is lost; it is made again for the CPU.
+                self.leave_the_gpu(&why);
+                false
+            }
         }
     }
 

@@ -314,3 +314,65 @@ fn blend_calls_a_copied_key_real_and_a_mean_synthesised() {
     let key: Vec<u8> = (0..=255_u8).flat_map(|pixel| [pixel; 4]).collect();
     assert_eq!(rig.pixels(), key);
 }
+
+/// A stream on a display that tells, with a key that does not move on: eased to a stop.
+fn standing() -> Rig {
+    let mut rig = Rig::new(Method::Hold);
+    rig.core.use_display(Some(INTERVAL));
+    rig.now = at_ms(1_000);
+    rig.key(1_000);
+    rig
+}
+
+/// Makes the next picture, hands it over, and hears that it was shown, or not.
+fn hand_over(rig: &mut Rig, is_shown: bool) -> FrameOutcome {
+    let (plan, outcome) = rig.make_in(MonoSpan::from_us(100));
+    if let FrameOutcome::Presented(_) = outcome {
+        rig.core.on_handed_over(&plan, rig.now, true);
+        let planned = plan.present_at;
+        rig.now = rig.now.max(planned);
+        rig.core.on_told(match is_shown {
+            true => Told::Presented { planned, presented_at: planned, heard_at: rig.now },
+            false => Told::Discarded { planned },
+        });
+    } else {
+        rig.now = rig.now.max(plan.present_at);
+    }
+    outcome
+}
+
+#[test]
+fn a_picture_that_is_shown_again_for_a_window_that_moved_counts_as_repeated() {
+    let mut rig = standing();
+    assert!(matches!(hand_over(&mut rig, true), FrameOutcome::Presented(_)), "the key");
+    assert_eq!(rig.core.counts().real, 1);
+    assert_eq!(hand_over(&mut rig, true), FrameOutcome::Repeated, "nothing has changed");
+    let before = rig.core.counts();
+    rig.core.on_told(Told::Moved);
+    assert!(rig.core.is_to_show_again());
+    // Discarded, it is still to be shown, and the display shows the same picture.
+    assert!(matches!(hand_over(&mut rig, false), FrameOutcome::Presented(_)));
+    assert!(rig.core.is_to_show_again());
+    assert!(matches!(hand_over(&mut rig, true), FrameOutcome::Presented(_)));
+    assert!(!rig.core.is_to_show_again());
+    let after = rig.core.counts();
+    assert_eq!((after.real, after.synthesised, after.dropped), (1, 0, before.dropped), "{after:?}");
+    assert!(after.repeated >= before.repeated + 2, "{before:?} {after:?}");
+    // The control: a key that has come meanwhile is a picture of its own.
+    rig.core.on_told(Told::Moved);
+    rig.key(1_040);
+    assert!(matches!(hand_over(&mut rig, true), FrameOutcome::Presented(_)));
+    assert_eq!(rig.core.counts().real, 2);
+}
+
+#[test]
+fn a_picture_that_was_discarded_counts_when_it_is_shown_at_last() {
+    let mut rig = standing();
+    hand_over(&mut rig, false);
+    let counts = rig.core.counts();
+    assert_eq!((counts.real, counts.dropped), (0, 1));
+    assert!(rig.core.is_to_show_again());
+    hand_over(&mut rig, true);
+    let counts = rig.core.counts();
+    assert_eq!((counts.real, counts.dropped), (1, 1));
+}

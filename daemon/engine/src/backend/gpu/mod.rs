@@ -11,6 +11,7 @@
 pub mod adapters;
 mod device;
 mod error;
+mod picture;
 mod planes;
 pub mod test_adapters;
 mod transfer;
@@ -22,6 +23,7 @@ use zerocopy::IntoBytes;
 pub use adapters::{GpuAdapter, adapters};
 pub use device::Gpu;
 pub use error::GpuError;
+pub use picture::GpuPicture;
 
 use super::FrameInput;
 use super::shader::{Extent, STRIP, Shader, Slot};
@@ -44,6 +46,7 @@ use crate::warp::resolve::{CLASSIFY, RESOLVE};
 use crate::warp::scatter::{SCATTER, SOURCE};
 use crate::warp::voxel::{Between, VOXEL, VOXEL_OLDER, VoxelWords};
 use device::Compiled;
+use picture::Spares;
 use planes::Planes;
 use transfer::{Download, Upload};
 
@@ -119,6 +122,8 @@ pub(crate) struct GpuBackend {
     field_upload: [Upload; 4],
     color_upload: Upload,
     download: Download,
+    /// For pictures that stay on the device.
+    spares: Spares,
     /// The field map as the shaders read it.
     tables: Vec<u32>,
     /// How far tiles are blurred, as the shader reads it.
@@ -158,6 +163,7 @@ impl GpuBackend {
             field_upload: Default::default(),
             color_upload: Upload::default(),
             download: Download::default(),
+            spares: Spares::default(),
             tables: Vec::new(),
             weights: Vec::new(),
             depth: Vec::new(),
@@ -356,6 +362,7 @@ impl GpuBackend {
     }
 
     /// Makes a picture into `out`, which has the size and format of the keys; they have been taken.
+    /// One that it `keeps` stays on the device instead, done, and `out` is unspecified.
     ///
     /// # Errors
     /// If the device is gone, refuses, or does not answer; `out` is then unspecified.
@@ -363,7 +370,8 @@ impl GpuBackend {
         &mut self,
         frame: &FrameInput<'_>,
         out: &mut ColorPlane,
-    ) -> Result<(), GpuError> {
+        keeps: bool,
+    ) -> Result<Option<GpuPicture>, GpuError> {
         let gpu = Arc::clone(&self.gpu);
         gpu.guard(|| {
             let mut params = self.params(frame.newest, frame.map, frame.phase);
@@ -378,8 +386,12 @@ impl GpuBackend {
                 self.send_older(older)?;
             }
             let bytes_per_pixel = u64::from(out.format().bytes_per_pixel());
+            let columns_and_rows = [out.width(), out.height()];
             let bytes = out.as_mut_bytes();
             let size = bytes.len() as u64;
+            if let Some(spare) = self.spares.take() {
+                self.planes.put_missing(Slot::Out, spare);
+            }
             self.planes.sized(&gpu, Slot::Out, size)?;
             if let Some(split) = &frame.finish {
                 params = params.finished(split);
@@ -398,10 +410,17 @@ impl GpuBackend {
             if frame.finish.is_some() {
                 dispatch(&gpu, &mut commands, &self.finish_steps, &self.planes, &params)?;
             }
+            if keeps {
+                let submission = gpu.queue.submit([commands.finish()]);
+                gpu.wait(submission)?;
+                let made = self.planes.take(Slot::Out)?;
+                return Ok(Some(GpuPicture::new(&gpu, made, columns_and_rows, &self.spares)));
+            }
             let made = self.planes.sized(&gpu, Slot::Out, size)?;
             self.download.copy(&gpu, &mut commands, made, size);
             let submission = gpu.queue.submit([commands.finish()]);
-            self.download.read(&gpu, submission, bytes)
+            self.download.read(&gpu, submission, bytes)?;
+            Ok(None)
         })
     }
 }

@@ -50,6 +50,17 @@ impl Planes {
         held.ok_or_else(|| GpuError::Refused { why: format!("{slot:?} has no buffer yet") })
     }
 
+    /// Takes the buffer of `slot` away; the next one will be another.
+    pub(super) fn take(&mut self, slot: Slot) -> Result<wgpu::Buffer, GpuError> {
+        let held = self.planes[slot as usize].take();
+        held.ok_or_else(|| GpuError::Refused { why: format!("{slot:?} has no buffer yet") })
+    }
+
+    /// Gives `slot` this buffer, unless it has one.
+    pub(super) fn put_missing(&mut self, slot: Slot, buffer: wgpu::Buffer) {
+        self.planes[slot as usize].get_or_insert(buffer);
+    }
+
     /// Lets two planes change places.
     pub(super) fn swap(&mut self, a: Slot, b: Slot) {
         self.planes.swap(a as usize, b as usize);

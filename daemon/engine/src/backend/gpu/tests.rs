@@ -76,7 +76,7 @@ fn on_gpu(
     let map = map_of_moving(newest);
     let make = |phase| {
         let mut out = newest.color.clone();
-        backend.make(&input(method, phase, older, newest, &map), &mut out).unwrap();
+        backend.make(&input(method, phase, older, newest, &map), &mut out, false).unwrap();
         out
     };
     phases.map(make).collect()
@@ -297,6 +297,49 @@ fn every_adapter_blends_as_the_cpu_does() {
     }
 }
 
+/// The bytes of a picture that stayed on its device.
+fn read(picture: &GpuPicture, like: &ColorPlane) -> ColorPlane {
+    let (gpu, mut out) = (picture.gpu(), like.clone());
+    let mut commands = gpu.device.create_command_encoder(&Default::default());
+    let mut download = Download::default();
+    let size = out.as_bytes().len() as u64;
+    download.copy(gpu, &mut commands, picture.buffer(), size);
+    let submission = gpu.queue.submit([commands.finish()]);
+    download.read(gpu, submission, out.as_mut_bytes()).unwrap();
+    out
+}
+
+#[test]
+fn a_picture_that_stays_on_its_device_is_the_one_that_would_come_back_whatever_follows() {
+    for gpu in test_gpus("a_picture_that_stays_on_its_device_is_the_one_that_would_come_back") {
+        let newest =
+            key(noise(FORMATS[0], 64, 40, 1), depth_noise(64, 40, 2), velocity_noise(64, 40, 6, 3));
+        let map = map_of(&newest);
+        let mut backend =
+            GpuBackend::new(&gpu, newest.color.format(), Method::Linear, false).unwrap();
+        backend.take_key(&newest, &map).unwrap();
+        let mut out = newest.color.clone();
+        let mut make = |phase, keeps| {
+            let input = input(Method::Linear, phase, &newest, &newest, &map);
+            backend.make(&input, &mut out, keeps).unwrap()
+        };
+        let phases: Vec<_> = phases().collect();
+        // Two at a time, and others in between.
+        for pair in phases.windows(2) {
+            let kept = [0, 1].map(|it| make(pair[it], true).expect("it stays"));
+            assert!(make(Phase::from_f64(0.5), false).is_none(), "it comes back");
+            let size = [newest.color.width(), newest.color.height()];
+            let expected = [0, 1].map(|it| on_cpu(Method::Linear, &[&newest], pair[it]));
+            for (kept, expected) in kept.iter().zip(&expected) {
+                assert_eq!(kept.size(), size);
+                assert_eq!(difference(&read(kept, expected), expected), None, "{}", gpu.name());
+            }
+            // The control: they are two pictures.
+            assert_ne!(difference(&read(&kept[0], &expected[0]), &expected[1]), None);
+        }
+    }
+}
+
 #[test]
 fn one_pixel_of_the_key_that_differs_is_found() {
     for gpu in test_gpus("one_pixel_of_the_key_that_differs_is_found") {
@@ -347,7 +390,8 @@ fn a_step_before_its_key_is_an_error() {
         let mut backend = GpuBackend::new(&gpu, ColorFormat::Rgba8, Method::Blend, false).unwrap();
         let mut out = key.color.clone();
         let map = FieldMap::default();
-        let made = backend.make(&input(Method::Blend, Phase::ZERO, &key, &key, &map), &mut out);
+        let made =
+            backend.make(&input(Method::Blend, Phase::ZERO, &key, &key, &map), &mut out, false);
         assert!(matches!(made, Err(GpuError::Refused { .. })), "{made:?}");
     }
 }
@@ -404,7 +448,7 @@ fn every_adapter_finishes_as_the_cpu_does() {
                         ..input(Method::Gather, phase, &key, &key, &map)
                     };
                     let mut made = key.color.clone();
-                    backend.make(&frame, &mut made).unwrap();
+                    backend.make(&frame, &mut made, false).unwrap();
                     assert_eq!(
                         difference(&made, &expected),
                         None,

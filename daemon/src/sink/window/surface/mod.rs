@@ -18,7 +18,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use foreframe_engine::backend::gpu::{Gpu, GpuError};
+use foreframe_engine::backend::gpu::{Gpu, GpuError, GpuPicture};
 use foreframe_engine::{ColorPlane, MonoTime, StreamFormat};
 use tracing::warn;
 use winit::event_loop::OwnedDisplayHandle;
@@ -31,6 +31,7 @@ use super::wayland::Face;
 use crate::stream::core::Told;
 use crate::stream::thread::ask_for_real_time_work;
 use output::Output;
+use pass::Picture;
 
 /// Time that driver and display have to make a surface.
 const READY_WITHIN: Duration = Duration::from_secs(5);
@@ -62,6 +63,9 @@ pub(super) enum SurfaceError {
     /// The driver makes none.
     #[error("the driver makes no surface: {0}")]
     Refused(String),
+    /// Another device makes the pictures than draws them.
+    #[error("the pictures are on another device")]
+    OtherDevice,
     /// It does not come back as it was.
     #[error("the surface was lost")]
     Lost,
@@ -79,10 +83,17 @@ pub(super) enum SurfaceError {
     NoAnswer,
 }
 
+/// A picture that was left: on the easel, or on the GPU.
+#[derive(Debug)]
+struct Left {
+    planned: MonoTime,
+    kept: Option<GpuPicture>,
+}
+
 /// A surface that a GPU draws on.
 #[derive(Debug)]
 pub(super) struct GpuSurface {
-    easel: Arc<Easel<MonoTime>>,
+    easel: Arc<Easel<Left>>,
     failed: Arc<Mutex<Option<SurfaceError>>>,
     /// Disconnected when the thread has ended.
     ended: Receiver<()>,
@@ -135,13 +146,34 @@ impl GpuSurface {
         planned: MonoTime,
         frame: &ColorPlane,
     ) -> Result<(), SurfaceError> {
-        if let Some(why) = self.failed.lock().unwrap_or_else(PoisonError::into_inner).clone() {
-            return Err(why);
-        }
-        if let Some(planned) = self.easel.leave(planned, frame) {
+        self.look()?;
+        self.on_replaced(self.easel.leave(Left { planned, kept: None }, frame));
+        Ok(())
+    }
+
+    /// The same for a picture that has stayed on the GPU.
+    ///
+    /// # Errors
+    /// The same.
+    pub(super) fn present_kept(
+        &self,
+        planned: MonoTime,
+        picture: GpuPicture,
+    ) -> Result<(), SurfaceError> {
+        self.look()?;
+        self.on_replaced(self.easel.leave_known(Left { planned, kept: Some(picture) }));
+        Ok(())
+    }
+
+    /// Whether the surface works.
+    fn look(&self) -> Result<(), SurfaceError> {
+        self.failed.lock().unwrap_or_else(PoisonError::into_inner).clone().map_or(Ok(()), Err)
+    }
+
+    fn on_replaced(&self, replaced: Option<Left>) {
+        if let Some(Left { planned, .. }) = replaced {
             self.shared.tell(WindowEvent::Told(Told::Discarded { planned }));
         }
-        Ok(())
     }
 }
 
@@ -156,7 +188,7 @@ impl Drop for GpuSurface {
 
 /// What the thread has of its own.
 struct Life {
-    easel: Arc<Easel<MonoTime>>,
+    easel: Arc<Easel<Left>>,
     failed: Arc<Mutex<Option<SurfaceError>>>,
     shared: Arc<Shared>,
     _ends: SyncSender<()>,
@@ -178,8 +210,9 @@ impl Life {
             return;
         }
         let mut drawn = None;
-        while let Some((planned, frame)) = self.easel.take(drawn.take()) {
-            let shown = output.show(planned, &frame);
+        while let Some((Left { planned, kept }, frame)) = self.easel.take(drawn.take()) {
+            let picture = kept.as_ref().map_or(Picture::Here(&frame), Picture::Kept);
+            let shown = output.show(planned, &picture);
             let discarded = WindowEvent::Told(Told::Discarded { planned });
             match shown {
                 Ok(true) => {}

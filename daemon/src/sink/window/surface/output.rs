@@ -3,11 +3,11 @@
 use std::sync::{Arc, PoisonError};
 
 use foreframe_engine::backend::gpu::{Gpu, GpuError};
-use foreframe_engine::{ColorPlane, MonoTime, StreamFormat};
+use foreframe_engine::{MonoTime, StreamFormat};
 use tracing::{debug, info};
 use wgpu::{CompositeAlphaMode, CurrentSurfaceTexture, PresentMode, SurfaceTexture};
 
-use super::pass::Pass;
+use super::pass::{Pass, Picture};
 use super::policy::{SurfaceFormat, Waits, present_mode, surface_format};
 use super::{Canvas, SurfaceError};
 use crate::sink::window::placement::Placement;
@@ -90,21 +90,26 @@ impl Output {
         format!("a surface of {name}, {mode:?}, {texture:?} {color_space:?}")
     }
 
-    /// Draws `frame` and hands it to the display; false if that does not want it now.
+    /// Draws `picture` and hands it to the display; false if that does not want it now.
     ///
     /// # Errors
     /// If the surface or the device does not work any more.
     pub(super) fn show(
         &mut self,
         planned: MonoTime,
-        frame: &ColorPlane,
+        picture: &Picture<'_>,
     ) -> Result<bool, SurfaceError> {
-        let placement = self.place([frame.width(), frame.height()]);
+        if let Picture::Kept(picture) = picture
+            && !Arc::ptr_eq(picture.gpu(), &self.gpu)
+        {
+            return Err(SurfaceError::OtherDevice);
+        }
+        let placement = self.place(picture.size());
         if self.waits == Waits::AtTheGate && !self.gate.is_open() {
             return Ok(false);
         }
         let Some(texture) = self.acquire(placement.buffer)? else { return Ok(false) };
-        self.pass.draw(&self.gpu, frame, &placement, &texture.texture)?;
+        self.pass.draw(&self.gpu, picture, &placement, &texture.texture)?;
         let gate = (self.waits == Waits::AtTheGate).then_some(&self.gate);
         if let Canvas::Wayland(face) = &self.canvas {
             face.lock().unwrap_or_else(PoisonError::into_inner).before_commit(planned, gate);
@@ -137,17 +142,21 @@ impl Output {
             if self.size != Some(size) {
                 self.configure(size)?;
             }
-            match self.gpu.guard(|| Ok(self.surface.get_current_texture()))? {
+            let acquired = self.gpu.guard(|| match self.surface.get_current_texture() {
+                CurrentSurfaceTexture::Validation => {
+                    Err(GpuError::Refused { why: "no texture of the surface".to_owned() })
+                }
+                other => Ok(other),
+            });
+            match acquired? {
                 CurrentSurfaceTexture::Success(texture)
                 | CurrentSurfaceTexture::Suboptimal(texture) => return Ok(Some(texture)),
                 CurrentSurfaceTexture::Outdated => self.size = None,
                 CurrentSurfaceTexture::Timeout | CurrentSurfaceTexture::Occluded => {
                     return Ok(None);
                 }
-                CurrentSurfaceTexture::Lost => return Err(SurfaceError::Lost),
-                CurrentSurfaceTexture::Validation => {
-                    let why = "no texture of the surface".to_owned();
-                    return Err(GpuError::Refused { why }.into());
+                CurrentSurfaceTexture::Lost | CurrentSurfaceTexture::Validation => {
+                    return Err(SurfaceError::Lost);
                 }
             }
         }

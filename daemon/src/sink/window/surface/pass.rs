@@ -3,7 +3,7 @@
 //! The picture is a buffer of the engine's texels, as they are; the shader places it, scales it to
 //! the nearest pixel, and turns its texels into what the surface's stand for.
 
-use foreframe_engine::backend::gpu::{Gpu, GpuError};
+use foreframe_engine::backend::gpu::{Gpu, GpuError, GpuPicture};
 use foreframe_engine::color::ColorFormat;
 use foreframe_engine::format::{Primaries, Transfer};
 use foreframe_engine::{ColorPlane, Rect, StreamFormat};
@@ -15,6 +15,25 @@ use crate::sink::window::placement::Placement;
 const SHADER: &str = include_str!("surface.wgsl");
 /// Words of the shader's parameters.
 const PARAMS: usize = 24;
+
+/// A picture to be drawn.
+#[derive(Debug)]
+pub(super) enum Picture<'a> {
+    /// In memory.
+    Here(&'a ColorPlane),
+    /// On the device that draws it.
+    Kept(&'a GpuPicture),
+}
+
+impl Picture<'_> {
+    /// Columns and rows.
+    pub(super) fn size(&self) -> [u32; 2] {
+        match self {
+            Self::Here(frame) => [frame.width(), frame.height()],
+            Self::Kept(picture) => picture.size(),
+        }
+    }
+}
 
 /// Draws the pictures of one stream on surfaces of one format.
 #[derive(Debug)]
@@ -73,22 +92,24 @@ impl Pass {
         })
     }
 
-    /// Submits what draws `frame` on `target`, black around it. Returns before it is done.
+    /// Submits what draws `picture` on `target`, black around it. Returns before it is done.
     ///
     /// # Errors
     /// If the device is gone, or the picture too large for it.
     pub(super) fn draw(
         &mut self,
         gpu: &Gpu,
-        frame: &ColorPlane,
+        picture: &Picture<'_>,
         placement: &Placement,
         target: &wgpu::Texture,
     ) -> Result<(), GpuError> {
         gpu.guard(|| {
-            let words =
-                params([frame.width(), frame.height()], placement, &self.stream, self.encoding);
+            let words = params(picture.size(), placement, &self.stream, self.encoding);
             gpu.queue().write_buffer(&self.params, 0, &words);
-            let group = self.upload(gpu, frame.as_bytes());
+            let group = match picture {
+                Picture::Here(frame) => self.upload(gpu, frame.as_bytes()),
+                Picture::Kept(picture) => self.bind(gpu, picture.buffer()),
+            };
             let view = target.create_view(&wgpu::TextureViewDescriptor::default());
             let mut commands = gpu.device().create_command_encoder(&Default::default());
             let mut pass = commands.begin_render_pass(&wgpu::RenderPassDescriptor {

@@ -31,7 +31,7 @@ fn drawn(
         view_formats: &[],
     });
     let mut pass = Pass::new(gpu, stream, surface).expect("a pass");
-    pass.draw(gpu, frame, placement, &target).expect("a picture");
+    pass.draw(gpu, &Picture::Here(frame), placement, &target).expect("a picture");
     let row = surface.texture.block_copy_size(None).expect("bytes") * width;
     let stride = row.next_multiple_of(256);
     let buffer = gpu.device().create_buffer(&wgpu::BufferDescriptor {
