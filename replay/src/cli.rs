@@ -135,7 +135,7 @@ mod tests {
 
     #[test]
     fn blur_of_the_whole_picture_is_refused_without_finishing() {
-        for command in [&["replay", "file.mcap"][..], &["score", "file.mcap"]] {
+        for command in [&["replay", "x.mcap"][..], &["score", "x.mcap", "--ratio", "4"]] {
             let parse = |more: &[&str]| {
                 Cli::try_parse_from([&["foreframe"], command, more].concat()).map(|_| ())
             };
