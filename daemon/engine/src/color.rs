@@ -94,6 +94,14 @@ pub trait Texel: Copy + Default + PartialEq + Send + Sync + 'static {
     #[must_use]
     fn luma8(self) -> u8;
 
+    /// [`Texel::luma8`] of each of `texels`, into `out`.
+    #[inline(always)]
+    fn luma8_run(texels: &[Self], out: &mut [u8]) {
+        for (luma, texel) in out.iter_mut().zip(texels) {
+            *luma = texel.luma8();
+        }
+    }
+
     /// [`Texel::bilinear`] of pixels `i` and `i + 1` of `top` and `bottom` into each `out[i]`.
     #[inline(always)]
     fn bilinear_run(top: &[Self], bottom: &[Self], fx: u32, fy: u32, out: &mut [Self]) {
@@ -175,6 +183,20 @@ impl Texel for Rgba8 {
     #[inline(always)]
     fn luma8(self) -> u8 {
         (packed_luma(self.0, RGBA8_FIELDS) >> 2) as u8
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    fn luma8_run(texels: &[Self], out: &mut [u8]) {
+        let done = if has_avx2() {
+            // SAFETY: the processor has AVX2, asked for just above.
+            unsafe { avx2::luma8_run(texels, out) }
+        } else {
+            0
+        };
+        for (luma, texel) in out.iter_mut().zip(texels).skip(done) {
+            *luma = texel.luma8();
+        }
     }
 
     #[inline]

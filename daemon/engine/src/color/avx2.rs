@@ -6,10 +6,11 @@
 use std::arch::x86_64::{
     __m256i, _mm256_add_epi16, _mm256_add_epi32, _mm256_and_si256, _mm256_andnot_si256,
     _mm256_cvtsi256_si32, _mm256_i32gather_epi32, _mm256_loadu_si256, _mm256_madd_epi16,
-    _mm256_max_epi32, _mm256_min_epi32, _mm256_mullo_epi16, _mm256_mullo_epi32, _mm256_or_si256,
-    _mm256_packs_epi32, _mm256_packus_epi16, _mm256_permutevar8x32_epi32, _mm256_set1_epi16,
-    _mm256_set1_epi32, _mm256_setr_epi32, _mm256_setzero_si256, _mm256_shuffle_epi32,
-    _mm256_slli_epi32, _mm256_srai_epi32, _mm256_srli_epi32, _mm256_storeu_si256, _mm256_sub_epi32,
+    _mm256_maddubs_epi16, _mm256_max_epi32, _mm256_min_epi32, _mm256_mullo_epi16,
+    _mm256_mullo_epi32, _mm256_or_si256, _mm256_packs_epi32, _mm256_packus_epi16,
+    _mm256_permutevar8x32_epi32, _mm256_set1_epi16, _mm256_set1_epi32, _mm256_setr_epi32,
+    _mm256_setzero_si256, _mm256_shuffle_epi32, _mm256_slli_epi32, _mm256_srai_epi32,
+    _mm256_srli_epi16, _mm256_srli_epi32, _mm256_storeu_si256, _mm256_sub_epi32,
     _mm256_testz_si256, _mm256_unpackhi_epi8, _mm256_unpackhi_epi16, _mm256_unpackhi_epi32,
     _mm256_unpacklo_epi8, _mm256_unpacklo_epi16, _mm256_unpacklo_epi32, _mm256_xor_si256,
 };
@@ -179,6 +180,37 @@ pub(super) fn bilinear_run(
         unsafe { _mm256_storeu_si256(out.as_mut_ptr().cast(), pixels) };
     }
     eights.len() * LANES
+}
+
+/// Pixels whose luma is made at a time.
+const LUMA_LANES: usize = 32;
+
+/// [`super::Texel::luma8`] of each of `texels`, into `out`, as many as whole steps hold; returns
+/// their number.
+#[target_feature(enable = "avx2")]
+pub(super) fn luma8_run(texels: &[Rgba8], out: &mut [u8]) -> usize {
+    // Red, green twice, blue, and no alpha: two sums of 16 bits a pixel, then one.
+    let (weights, ones) = (_mm256_set1_epi32(0x0001_0201), _mm256_set1_epi16(1));
+    // Packing goes on in each half of a register by itself: fours of pixels come out in this order.
+    let order = _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7);
+    let texels = texels.as_chunks::<LUMA_LANES>().0;
+    let steps = out.as_chunks_mut::<LUMA_LANES>().0.iter_mut().zip(texels);
+    let count = steps.len();
+    for (out, texels) in steps {
+        let four_times = |at: usize| {
+            let eight = &texels[at * LANES..][..LANES];
+            // SAFETY: there are 8 pixels of 32 bits, and the load needs no alignment.
+            let eight = unsafe { _mm256_loadu_si256(eight.as_ptr().cast()) };
+            _mm256_madd_epi16(_mm256_maddubs_epi16(eight, weights), ones)
+        };
+        let low = _mm256_packs_epi32(four_times(0), four_times(1));
+        let high = _mm256_packs_epi32(four_times(2), four_times(3));
+        let luma = _mm256_packus_epi16(_mm256_srli_epi16(low, 2), _mm256_srli_epi16(high, 2));
+        let luma = _mm256_permutevar8x32_epi32(luma, order);
+        // SAFETY: `out` holds 32 values of 8 bits, and the store needs no alignment.
+        unsafe { _mm256_storeu_si256(out.as_mut_ptr().cast(), luma) };
+    }
+    count * LUMA_LANES
 }
 
 /// Interpolates to the right: 16 bits per channel, the low and the high two pixels of each half.

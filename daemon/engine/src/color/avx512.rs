@@ -6,15 +6,16 @@
 //! [`crate::simd`] means by AVX-512.
 
 use std::arch::x86_64::{
-    __m512i, __mmask16, _mm_cvtsi128_si32, _mm_extract_epi32, _mm512_add_epi16, _mm512_add_epi32,
-    _mm512_and_si512, _mm512_castsi512_si128, _mm512_cmpgt_epu32_mask, _mm512_dpwssd_epi32,
-    _mm512_extracti32x4_epi32, _mm512_i32gather_epi32, _mm512_loadu_si512, _mm512_mask_blend_epi32,
-    _mm512_max_epi32, _mm512_min_epi32, _mm512_mullo_epi16, _mm512_mullo_epi32, _mm512_or_si512,
-    _mm512_packs_epi32, _mm512_packus_epi16, _mm512_permutex2var_epi32, _mm512_set1_epi16,
-    _mm512_set1_epi32, _mm512_setzero_si512, _mm512_shuffle_epi32, _mm512_slli_epi32,
-    _mm512_srai_epi32, _mm512_srli_epi32, _mm512_storeu_si512, _mm512_sub_epi32,
-    _mm512_unpackhi_epi8, _mm512_unpackhi_epi16, _mm512_unpackhi_epi32, _mm512_unpacklo_epi8,
-    _mm512_unpacklo_epi16, _mm512_unpacklo_epi32, _mm512_xor_si512,
+    __m512i, __mmask16, _MM_HINT_T0, _mm_cvtsi128_si32, _mm_extract_epi32, _mm_prefetch,
+    _mm512_add_epi16, _mm512_add_epi32, _mm512_and_si512, _mm512_castsi512_si128,
+    _mm512_cmpgt_epu32_mask, _mm512_dpwssd_epi32, _mm512_extracti32x4_epi32,
+    _mm512_i32gather_epi32, _mm512_loadu_si512, _mm512_mask_blend_epi32, _mm512_max_epi32,
+    _mm512_min_epi32, _mm512_mullo_epi16, _mm512_mullo_epi32, _mm512_or_si512, _mm512_packs_epi32,
+    _mm512_packus_epi16, _mm512_permutex2var_epi32, _mm512_set1_epi16, _mm512_set1_epi32,
+    _mm512_setzero_si512, _mm512_shuffle_epi32, _mm512_slli_epi32, _mm512_srai_epi32,
+    _mm512_srli_epi32, _mm512_storeu_si512, _mm512_sub_epi32, _mm512_unpackhi_epi8,
+    _mm512_unpackhi_epi16, _mm512_unpackhi_epi32, _mm512_unpacklo_epi8, _mm512_unpacklo_epi16,
+    _mm512_unpacklo_epi32, _mm512_xor_si512,
 };
 
 use super::Rgba8;
@@ -155,6 +156,9 @@ fn near_corners(plane: &Plane<Rgba8>, x: __m512i, y: __m512i) -> Option<Corners>
     let read = |row: usize| {
         let window = plane.data().get(row.min(last_row) * width + first as usize..)?;
         let window: &[Rgba8; WINDOW] = window.first_chunk()?;
+        // What is read now is read once more one row below, and the row below that has to come.
+        let ahead = window.as_ptr().wrapping_add(width);
+        _mm_prefetch::<_MM_HINT_T0>(ahead.cast());
         // SAFETY: the window holds 2 times 16 pixels of 32 bits, and the loads need no alignment.
         let halves = unsafe {
             [

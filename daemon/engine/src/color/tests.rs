@@ -8,6 +8,20 @@ use proptest::prelude::*;
 
 proptest! {
     #[test]
+    fn luma_of_a_run_is_that_of_each_pixel(
+        texels in proptest::collection::vec(any::<u32>(), 0..100),
+    ) {
+        let texels: Vec<_> = texels.into_iter().map(Rgba8).collect();
+        let expected: Vec<_> = texels.iter().map(|texel| texel.luma8()).collect();
+        for simd in Simd::ALL {
+            simd.enter();
+            let mut luma = vec![0; texels.len()];
+            Rgba8::luma8_run(&texels, &mut luma);
+            prop_assert_eq!(&luma, &expected, "{:?}", simd);
+        }
+    }
+
+    #[test]
     fn all_channels_at_once_equal_channel_by_channel(
         corners: [u32; 4], fx in 0_u32..256, fy in 0_u32..256,
     ) {

@@ -38,6 +38,7 @@ pub(super) fn sad_in_any_light(now: &Level, a: [i32; 2], then: &Level, b: [i32; 
 }
 
 /// Sum over a block of the difference from its mean.
+#[inline(always)]
 pub(super) fn contrast(level: &Level, at: [i32; 2]) -> u32 {
     let rows =
         || (0..BLOCK.cast_signed()).map(|y| level.run::<{ BLOCK as usize }>(at[0], at[1] + y));

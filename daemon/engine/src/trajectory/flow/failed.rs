@@ -251,6 +251,7 @@ fn is_near(marks: &Plane<bool>, [x, y]: [u32; 2]) -> bool {
 }
 
 /// (5), pixel by pixel.
+#[inline(always)]
 fn has_failed(own: &Own<'_>, levels: [&Level; 2], block: [u32; 2]) -> bool {
     let at = start(levels[0], block);
     own.seen(levels, at).error > NOISE + contrast(levels[0], at) / 4

@@ -100,9 +100,7 @@ impl Level {
             #[inline(always)]
             |y, row| {
                 let texels = &color.row(valid.y + y)[valid.x as usize..];
-                for (luma, texel) in row.iter_mut().zip(texels) {
-                    *luma = texel.luma8();
-                }
+                T::luma8_run(&texels[..row.len()], row);
             },
         );
     }

@@ -61,55 +61,85 @@ impl<'a> Own<'a> {
     }
 
     /// The block at `at` by the motion of each pixel.
+    #[inline(always)]
     pub(super) fn seen(&self, [now, then]: [&Level; 2], at: [i32; 2]) -> Seen {
         let mut mask = [[false; SIDE]; SIDE];
         let mut r = [[0; SIDE]; SIDE];
-        let columns: [u32; SIDE] =
-            std::array::from_fn(|i| self.grid.nearest_to(0, at[0] + i as i32));
-        for (row, (mask, r)) in (0..).zip(mask.iter_mut().zip(&mut r)) {
-            let y = self.grid.nearest_to(1, at[1] + row);
-            let luma = now.run::<SIDE>(at[0], at[1] + row);
-            for (i, &x) in columns.iter().enumerate() {
-                let d = self.motion_of([x, y]);
-                let from = [((at[0] + i as i32) << 8) - d[0], ((at[1] + row) << 8) - d[1]];
-                if let Some(was) = then.sample(from)
-                    && self.was_seen([x, y], from)
-                {
-                    mask[i] = true;
-                    r[i] = was - 16 * i32::from(luma[i]);
+        let across: [i32; SIDE] = std::array::from_fn(|i| at[0] + i as i32);
+        let columns = self.grid.nearest_each(0, across);
+        for (down, (mask, r)) in (at[1]..).zip(mask.iter_mut().zip(&mut r)) {
+            let y = self.grid.nearest_to(1, down);
+            let luma = now.run::<SIDE>(at[0], down);
+            // Step by step for all pixels of the row, which suits wide registers.
+            let motion = columns.map(|x| self.motion.at(x, y));
+            let mut from = [[0; SIDE]; 2];
+            for i in 0..SIDE {
+                let [dx, dy] = q8(motion[i]);
+                from[0][i] = (across[i] << 8) - dx;
+                from[1][i] = (down << 8) - dy;
+            }
+            *mask = self.were_seen(columns, y, from);
+            for i in 0..SIDE {
+                if mask[i] {
+                    match then.sample([from[0][i], from[1][i]]) {
+                        Some(was) => r[i] = was - 16 * i32::from(luma[i]),
+                        None => mask[i] = false,
+                    }
                 }
             }
         }
         Seen { error: in_any_light(&r, &mask), mask }
     }
 
-    /// Whether the older key shows the surface of a cell where it came from, as far as depth tells.
+    /// Whether the older key shows the surfaces of cells of row `y` where they came from, as far as
+    /// depth tells.
     #[inline(always)]
-    fn was_seen(&self, [x, y]: [u32; 2], from: [i32; 2]) -> bool {
-        let Some((depth, older, grid)) = &self.depths else { return true };
-        let [then_x, then_y] = grid.nearest(from.map(|from| (from + 128) >> 8));
-        is_same_surface(depth.at(x, y), older.at(then_x, then_y))
+    fn were_seen(&self, columns: [u32; SIDE], y: u32, from: [[i32; SIDE]; 2]) -> [bool; SIDE] {
+        let Some((depth, older, grid)) = &self.depths else { return [true; SIDE] };
+        let [xs, ys] = from.map(|from| from.map(|from| (from + 128) >> 8));
+        let (xs, ys) = (grid.nearest_each(0, xs), grid.nearest_each(1, ys));
+        let now = columns.map(|x| depth.at(x, y));
+        let then: [u32; SIDE] = std::array::from_fn(|i| older.at(xs[i], ys[i]));
+        std::array::from_fn(|i| is_same_surface(now[i], then[i]))
     }
 
     /// Motion of a cell, Q8 pixels; 0 where none is known.
     #[inline(always)]
-    #[expect(clippy::cast_possible_truncation, reason = "motion is rounded")]
     fn motion_of(&self, [x, y]: [u32; 2]) -> [i32; 2] {
-        let [dx, dy] = self.motion.at(x, y);
-        let is_known = dx.is_finite() & dy.is_finite();
-        let q8 = |d: f32| (d.clamp(-MOST_PX, MOST_PX) * 256.0) as i32;
-        if is_known { [q8(dx), q8(dy)] } else { [0; 2] }
+        q8(self.motion.at(x, y))
     }
 }
 
-/// Sum of what is left of differences in sixteenths, without their mean, over those that count.
-pub(super) fn in_any_light(r: &[[i32; SIDE]; SIDE], counts: &Mask) -> u32 {
-    let counted = || {
-        let of = r.as_flattened().iter().zip(counts.as_flattened());
-        of.filter(|(_, counts)| **counts).map(|(r, _)| *r)
+/// Motion in Q8 pixels, rounded towards 0; 0 where it is not known.
+#[inline(always)]
+fn q8([dx, dy]: [f32; 2]) -> [i32; 2] {
+    // Adding this moves a whole number of up to 22 bits into the low bits of the mantissa: a cast
+    // would saturate, one number at a time.
+    const MAGIC: f32 = 12_582_912.0;
+    let is_known = dx.is_finite() & dy.is_finite();
+    let steps = |d: f32| {
+        let whole = (d.clamp(-MOST_PX, MOST_PX) * 256.0).trunc();
+        let bits = (whole + MAGIC).to_bits().cast_signed() - MAGIC.to_bits().cast_signed();
+        if is_known { bits } else { 0 }
     };
-    let mean = counted().sum::<i32>() / i32::try_from(counted().count().max(1)).unwrap_or(1);
-    counted().map(|r| (r - mean).unsigned_abs()).sum::<u32>() >> 4
+    [steps(dx), steps(dy)]
+}
+
+/// Sum of what is left of differences in sixteenths, without their mean, over those that count.
+#[inline(always)]
+pub(super) fn in_any_light(r: &[[i32; SIDE]; SIDE], counts: &Mask) -> u32 {
+    let (r, counts) = (r.as_flattened(), counts.as_flattened());
+    let (mut sum, mut count) = (0, 0);
+    for (r, counts) in r.iter().zip(counts) {
+        sum += if *counts { *r } else { 0 };
+        count += i32::from(*counts);
+    }
+    let mean = sum / count.max(1);
+    let mut left = 0;
+    for (r, counts) in r.iter().zip(counts) {
+        left += if *counts { (r - mean).unsigned_abs() } else { 0 };
+    }
+    left >> 4
 }
 
 /// Which cells of a field are nearest to pixels of a level.
@@ -141,6 +171,18 @@ impl Cells {
     fn nearest_to(&self, axis: usize, pixel: i32) -> u32 {
         let place = self.first[axis] + pixel as f32 * self.step[axis];
         (place as u32).min(self.last[axis])
+    }
+
+    /// [`Cells::nearest_to`] of each.
+    #[inline(always)]
+    #[expect(clippy::cast_precision_loss, reason = "positions up to 8192 are exact")]
+    fn nearest_each(&self, axis: usize, pixels: [i32; SIDE]) -> [u32; SIDE] {
+        const TWO_TO_23: f32 = 8_388_608.0;
+        let (first, step, last) = (self.first[axis], self.step[axis], self.last[axis] as f32);
+        pixels.map(|pixel| {
+            let place = (first + pixel as f32 * step).max(0.0).min(last).floor();
+            (place + TWO_TO_23).to_bits() - TWO_TO_23.to_bits()
+        })
     }
 
     #[inline(always)]
