@@ -12,7 +12,7 @@ use std::num::NonZeroUsize;
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 
-use daemon_fixture::child::{BACKEND, LAYOUT, lavapipe, run_if_asked};
+use daemon_fixture::child::{BACKEND, LAYOUT, lavapipe, run_if_asked, swiftshader};
 use foreframe_engine::backend::gpu::{Gpu, adapters};
 use foreframe_engine::{ColorPlane, Engine, EngineConfig, Method, MonoTime, StreamFormat};
 use foreframe_fixtures::{SCENES, Size};
@@ -180,6 +180,18 @@ fn a_stuck_surface_does_not_delay_the_one_beside_it_on_the_same_device() {
         shown += stage.client.take_waiting().iter().filter(|it| is_shown(it)).count();
     }
     strike(stage);
+}
+
+#[test]
+fn an_adapter_that_cannot_present_makes_pictures_for_a_window_that_the_cpu_draws() {
+    let Some(backend) = swiftshader() else { return };
+    let mut stage = Stage::set_with(Script::GOOD, &[(BACKEND, backend)]);
+    stage.show_until(|shown, _| shown.len() > 20);
+    stage.show_until_seen(|seen| seen.iter().any(|it| it.middle == KEY_SEEN));
+    stage.strike();
+    let log = stage.log();
+    let [way, backend] = ["way=\"wl_shm: ", "backend=\"gpu:"].map(|it| log.contains(it));
+    assert!(way && backend && log.contains("cannot present to this display"), "{log}");
 }
 
 /// A window of a child on a device of its own.

@@ -4,6 +4,8 @@
 //! it. [`super::thread`] waits and carries things to and fro; nothing here waits, sends or reads a
 //! clock other than the one it is given.
 
+mod outcome;
+
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -18,6 +20,9 @@ use foreframe_engine::{
     Phase, StreamFormat, UiInput,
 };
 
+use outcome::Counted;
+pub use outcome::{DroppedFrame, FrameCounts, FrameKind, FrameOutcome, PresentedFrame, Told};
+
 /// What a stream needs to know before its first key.
 #[derive(Clone, Copy, Debug)]
 pub struct CoreConfig {
@@ -30,86 +35,6 @@ pub struct CoreConfig {
     /// In-between frames are left out until something has moved by so many pixels (Falchetto et al.
     /// 2007, adaptive ratio). 0 leaves none out.
     pub least_step_px: f32,
-}
-
-/// What became of one plan.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum FrameOutcome {
-    /// A new picture goes to the display; [`StreamCore::frame`] holds it.
-    Presented(PresentedFrame),
-    /// The display shows the picture before again: there is nothing new to show.
-    Repeated,
-    /// The picture was not ready for its refresh, which shows the one before again.
-    Dropped(DroppedFrame),
-}
-
-/// A picture that was made in vain.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct DroppedFrame {
-    /// Real, or made.
-    pub kind: FrameKind,
-    /// Time that the engine took.
-    pub work: MonoSpan,
-}
-
-/// A picture that goes to the display.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct PresentedFrame {
-    /// Number of the output frame, counted up by one per refresh from the first picture on; what
-    /// was repeated or dropped leaves a gap.
-    pub index: u64,
-    /// The newest key that it was made from.
-    pub key_index: u64,
-    /// Content time of that key.
-    pub key_content_time: MonoTime,
-    /// Position after that key.
-    pub phase: Phase,
-    /// Real, or made.
-    pub kind: FrameKind,
-    /// Content time that it shows.
-    pub content_time: MonoTime,
-    /// Refresh that it was planned for.
-    pub present_at: MonoTime,
-    /// Refresh that it is shown at.
-    pub presented_at: MonoTime,
-    /// Refreshes since the picture before, all of which showed that one again: repeated or dropped.
-    pub repeats_before: u64,
-    /// Time that the engine took.
-    pub work: MonoSpan,
-}
-
-/// Where a picture comes from.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum FrameKind {
-    /// The key itself.
-    Real,
-    /// Made by the engine.
-    Synthesised,
-}
-
-/// What became of the refreshes from the first planned picture on. Each is in exactly one of real,
-/// synthesised, repeated and dropped.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct FrameCounts {
-    /// Keys taken in.
-    pub keys: u64,
-    /// Refreshes that showed a key itself.
-    pub real: u64,
-    /// Refreshes that showed a made picture.
-    pub synthesised: u64,
-    /// Refreshes that showed the picture before again because there was nothing new to show, or
-    /// nobody had time to plan them.
-    pub repeated: u64,
-    /// Refreshes that showed the picture before again because theirs was not ready in time.
-    pub dropped: u64,
-}
-
-/// What a picture that was handed over counts as.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Counted {
-    New(FrameKind),
-    /// The one before again, for a window that has changed.
-    Repeated,
 }
 
 /// Where pictures are shown.
@@ -131,32 +56,6 @@ const FIRST_DEADLINE_PERCENT: i64 = 55;
 const LONGEST_STRIDE: u32 = 8;
 /// Pictures under way at most; a display that answers nothing is not waited for.
 const UNDER_WAY: usize = 64;
-
-/// What a display tells.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Told {
-    /// The picture planned for `planned` was shown at `presented_at`, which was heard at
-    /// `heard_at`.
-    Presented {
-        /// As planned.
-        planned: MonoTime,
-        /// As shown.
-        presented_at: MonoTime,
-        /// When it said so.
-        heard_at: MonoTime,
-    },
-    /// The picture planned for `planned` was never shown.
-    Discarded {
-        /// As planned.
-        planned: MonoTime,
-    },
-    /// It announces another refresh interval.
-    Mode(MonoSpan),
-    /// Whether anybody can see it.
-    Visible(bool),
-    /// What it shows has another size or place, and takes it when a picture is handed over.
-    Moved,
-}
 
 /// Engine, pacer and display of one stream.
 #[derive(Debug)]

@@ -107,12 +107,22 @@ fn wait_for_the_end() -> i32 {
 /// The adapter that presents without a GPU, as a backend; None, and a word of it, where it is not
 /// installed.
 pub(crate) fn lavapipe() -> Option<&'static str> {
-    let name = std::thread::current().name().unwrap_or_default().to_owned();
-    let found = test_adapters(&name).iter().any(|it| it.facts.name.contains("llvmpipe"));
+    installed("llvmpipe").then_some("gpu:llvmpipe")
+}
+
+/// An adapter that has no way to Wayland, the same.
+pub(crate) fn swiftshader() -> Option<&'static str> {
+    installed("swiftshader").then_some("gpu:swiftshader")
+}
+
+fn installed(adapter: &str) -> bool {
+    let test = std::thread::current().name().unwrap_or_default().to_owned();
+    let is_it = |name: &str| name.to_lowercase().contains(adapter);
+    let found = test_adapters(&test).iter().any(|it| is_it(&it.facts.name));
     if !found {
-        eprintln!("skipped (1): {name}: no llvmpipe");
+        eprintln!("skipped (1): {test}: no {adapter}");
     }
-    found.then_some("gpu:llvmpipe")
+    found
 }
 
 impl ChildProcess {

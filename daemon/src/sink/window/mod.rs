@@ -2,11 +2,12 @@
 //!
 //! A thread of the daemon's own ([`WindowSystem`]) makes windows and hears what users do with them.
 //! The stream's thread opens one [`Window`] and gives it pictures with [`Window::present`], which
-//! never waits for the display: on Wayland ([`wayland`]) it copies the picture into a shared-memory
-//! buffer that is free and asks for presentation feedback just before the commit; elsewhere
-//! ([`software`]) it leaves it to a thread that paints. What happens to a window and to its frames
-//! comes as [`WindowEvent`]s, and each wakes the stream. What the desktop calls a window can be
-//! shared by several streams ([`host`]); each has its part of it as if that were a window.
+//! never waits for the display. A GPU adapter that makes the pictures draws them on a surface of its
+//! own ([`surface`]). Without one, on Wayland ([`wayland`]) a picture is copied into a shared-memory
+//! buffer that is free, elsewhere ([`software`]) it is left to a thread that paints. On Wayland
+//! presentation feedback is asked for just before each commit. What happens to a window and to its
+//! frames comes as [`WindowEvent`]s, and each wakes the stream. What the desktop calls a window can
+//! be shared by several streams ([`host`]); each has its part of it as if that were a window.
 //!
 //! What a display lacks is done without, and named ([`Feedback`]): without presentation feedback,
 //! or with one that never answers, frames are paced by frame callbacks, and without those by a
