@@ -34,8 +34,8 @@ use rustix::time::{ClockId, clock_gettime};
 const WAY: &str = "FOREFRAME_BENCH_WAY";
 const ADAPTER: &str = "FOREFRAME_BENCH_ADAPTER";
 const SIZE: Size = Size { width: 1280, height: 720 };
-const PICTURES: u32 = 300;
-const WARM_UP: u32 = 30;
+const PICTURES: u32 = 120;
+const WARM_UP: u32 = 20;
 /// `upload` goes through a surface from memory, `kept` never leaves the adapter; each beside making
 /// the picture alone.
 const WAYS: [&str; 5] = ["wl_shm", "upload", "make", "make, upload", "make, kept"];

@@ -110,7 +110,7 @@ pub(crate) fn lavapipe() -> Option<&'static str> {
     installed("llvmpipe").then_some("gpu:llvmpipe")
 }
 
-/// An adapter that has no way to Wayland, the same.
+/// Another driver that needs no GPU, the same.
 pub(crate) fn swiftshader() -> Option<&'static str> {
     installed("swiftshader").then_some("gpu:swiftshader")
 }

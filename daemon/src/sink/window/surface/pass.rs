@@ -14,7 +14,7 @@ use crate::sink::window::placement::Placement;
 
 const SHADER: &str = include_str!("surface.wgsl");
 /// Words of the shader's parameters.
-const PARAMS: usize = 24;
+const PARAMS: usize = 20;
 
 /// A picture to be drawn.
 #[derive(Debug)]
@@ -54,6 +54,11 @@ impl Pass {
         stream: &StreamFormat,
         surface: &SurfaceFormat,
     ) -> Result<Self, GpuError> {
+        let constants = constants(stream, surface.encoding);
+        let compilation_options = wgpu::PipelineCompilationOptions {
+            constants: &constants,
+            ..wgpu::PipelineCompilationOptions::default()
+        };
         gpu.guard(|| {
             let device = gpu.device();
             let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
@@ -75,7 +80,7 @@ impl Pass {
                 fragment: Some(wgpu::FragmentState {
                     module: &module,
                     entry_point: Some("fragment"),
-                    compilation_options: wgpu::PipelineCompilationOptions::default(),
+                    compilation_options,
                     targets: &[Some(surface.texture.into())],
                 }),
                 multiview_mask: None,
@@ -165,23 +170,17 @@ impl Pass {
     }
 }
 
-/// The parameters as the shader reads them.
-fn params(
-    size: [u32; 2],
-    placement: &Placement,
-    stream: &StreamFormat,
-    encoding: Encoding,
-) -> [u8; PARAMS * 4] {
-    let Rect { x, y, width, height } = placement.picture;
+/// What the shader has to know when it is compiled.
+fn constants(stream: &StreamFormat, encoding: Encoding) -> [(&'static str, f64); 4] {
     let format = match stream.color {
-        ColorFormat::Rgba8 => 0,
-        ColorFormat::Rgb10a2 => 1,
-        ColorFormat::Rgba16f => 2,
+        ColorFormat::Rgba8 => 0.0,
+        ColorFormat::Rgb10a2 => 1.0,
+        ColorFormat::Rgba16f => 2.0,
     };
     let transfer = match stream.transfer {
-        Transfer::Srgb => 0,
-        Transfer::Linear => 1,
-        Transfer::Pq => 2,
+        Transfer::Srgb => 0.0,
+        Transfer::Linear => 1.0,
+        Transfer::Pq => 2.0,
     };
     let as_they_are = matches!(
         (encoding, stream.transfer, stream.primaries),
@@ -190,18 +189,34 @@ fn params(
             | (Encoding::PqCodes, Transfer::Pq, Primaries::Bt2020)
     );
     let to_encoding = match encoding {
-        Encoding::SrgbCodes => 0,
-        Encoding::ClippedLight => 1,
-        Encoding::Light => 2,
-        Encoding::PqCodes => 3,
+        Encoding::SrgbCodes => 0.0,
+        Encoding::ClippedLight => 1.0,
+        Encoding::Light => 2.0,
+        Encoding::PqCodes => 3.0,
     };
+    let as_they_are = f64::from(u8::from(as_they_are));
+    [
+        ("FORMAT", format),
+        ("TRANSFER", transfer),
+        ("ENCODING", to_encoding),
+        ("AS_THEY_ARE", as_they_are),
+    ]
+}
+
+/// The parameters as the shader reads them.
+fn params(
+    size: [u32; 2],
+    placement: &Placement,
+    stream: &StreamFormat,
+    encoding: Encoding,
+) -> [u8; PARAMS * 4] {
+    let Rect { x, y, width, height } = placement.picture;
     let primaries = match encoding {
         Encoding::PqCodes => srgb::bt2020_from(stream.primaries),
         _ => srgb::bt709_from(stream.primaries),
     };
-    let words = [x, y, width, height, size[0], size[1], format, transfer, to_encoding];
-    let words = words.into_iter().chain([u32::from(as_they_are), srgb::white(stream).to_bits(), 0]);
-    let words = words.chain(rows(primaries));
+    let words = [x, y, width, height, size[0], size[1], srgb::white(stream).to_bits(), 0];
+    let words = words.into_iter().chain(rows(primaries));
     let mut bytes = [0; PARAMS * 4];
     for (place, word) in bytes.as_chunks_mut::<4>().0.iter_mut().zip(words) {
         *place = word.to_le_bytes();

@@ -1,19 +1,21 @@
 // The picture of a stream into a surface: placed, black around it, converted to what its texels
 // stand for. Numbers and formulas are those of sink/srgb.rs.
 
+// Known when the pipeline is made, so that no driver works through what is not needed.
+// Texels of the picture: 0 rgba8, 1 rgb10a2, 2 rgba16f.
+override FORMAT: u32;
+// What they stand for: 0 sRGB codes, 1 light, 2 PQ codes.
+override TRANSFER: u32;
+// The same of the surface: 0 sRGB codes, 1 clipped light, 2 light, 3 PQ codes.
+override ENCODING: u32;
+// 1 where codes go over as they are.
+override AS_THEY_ARE: u32;
+
 struct Params {
     // Left, top, width and height of the picture in the surface.
     place: vec4<u32>,
     // Columns and rows of the picture.
     size: vec2<u32>,
-    // Texels of the picture: 0 rgba8, 1 rgb10a2, 2 rgba16f.
-    format: u32,
-    // What they stand for: 0 sRGB codes, 1 light, 2 PQ codes.
-    transfer: u32,
-    // The same of the surface: 0 sRGB codes, 1 clipped light, 2 light, 3 PQ codes.
-    encoding: u32,
-    // 1 where codes go over as they are.
-    as_they_are: u32,
     // Luminance of 1, cd/m2.
     white: f32,
     unused: u32,
@@ -43,7 +45,7 @@ fn from_ordered(ordered: u32) -> f32 {
 }
 
 fn codes_at(index: u32) -> vec3<f32> {
-    switch params.format {
+    switch FORMAT {
         case 0u: {
             return unpack4x8unorm(picture[index]).rgb;
         }
@@ -96,7 +98,7 @@ fn pq_from_luminance(luminance: vec3<f32>) -> vec3<f32> {
 
 // Light, 1 at the stream's white.
 fn light_of(code: vec3<f32>) -> vec3<f32> {
-    switch params.transfer {
+    switch TRANSFER {
         case 0u: {
             return linear_from_srgb(code);
         }
@@ -118,11 +120,11 @@ fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
     }
     let source = at * params.size / params.place.zw;
     let code = codes_at(source.y * params.size.x + source.x);
-    if params.as_they_are == 1u {
+    if AS_THEY_ARE == 1u {
         return vec4<f32>(code, 1.0);
     }
     var light = light_of(code);
-    if params.encoding <= 1u {
+    if ENCODING <= 1u {
         light = clamp(light, vec3<f32>(0.0), vec3<f32>(1.0));
     }
     light = vec3<f32>(
@@ -130,7 +132,7 @@ fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
         dot(params.green.xyz, light),
         dot(params.blue.xyz, light),
     );
-    switch params.encoding {
+    switch ENCODING {
         case 0u: {
             let codes = srgb_from_linear(clamp(light, vec3<f32>(0.0), vec3<f32>(1.0)));
             return vec4<f32>(codes, 1.0);

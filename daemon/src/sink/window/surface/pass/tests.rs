@@ -256,9 +256,9 @@ fn the_shader_is_valid_and_reads_parameters_of_this_size() {
     let at = |word: usize| u32::from_le_bytes(words.as_chunks::<4>().0[word]);
     let Rect { x, y, width, height } = placement.picture;
     assert_eq!([at(0), at(1), at(2), at(3), at(4), at(5)], [x, y, width, height, 3, 2]);
-    assert_eq!(f32::from_bits(at(10)), 203.0);
+    assert_eq!(f32::from_bits(at(6)), 203.0);
     // White is white in any primaries.
-    for row in [12, 16, 20] {
+    for row in [8, 12, 16] {
         let sum: f32 = (row..row + 3).map(|word| f32::from_bits(at(word))).sum();
         assert!((sum - 1.0).abs() < 1e-4, "{sum}");
         assert_eq!(at(row + 3), 0);
