@@ -26,6 +26,8 @@ struct FrameParams {
     older_cells: vec2<u32>,
     ahead: i32,
     older_weight: u32,
+    held_fields: u32,
+    newest_field: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: FrameParams;

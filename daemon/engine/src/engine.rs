@@ -1,7 +1,7 @@
 //! Runs the steps in order: a key frame in, in-between frames out.
 //!
-//! One [`Engine`] serves one stream. It keeps the two newest keys and reuses its buffers: once
-//! every buffer has its size, neither a key nor a frame allocates pixels.
+//! One [`Engine`] serves one stream. It keeps the newest keys and reuses its buffers: once every
+//! buffer has its size, neither a key nor a frame allocates pixels.
 
 use std::num::NonZeroUsize;
 use std::sync::Arc;
@@ -27,6 +27,7 @@ use crate::time::{MonoSpan, MonoTime};
 use crate::trajectory::flow::Flow;
 use crate::trajectory::ladder::Ladder;
 use crate::ui::{UiInput, UiLayer, composite};
+use crate::warp::linear::kept_keys;
 
 /// What an engine does and with how much of the machine.
 #[derive(Clone, Copy, Debug)]
@@ -126,6 +127,8 @@ pub struct Engine {
     pool: Arc<ThreadPool>,
     newest: Option<KeyFrame>,
     previous: Option<KeyFrame>,
+    /// The keys before that, from the newest on, which holes may show.
+    remembered: Vec<KeyFrame>,
     /// A key frame that is no longer needed, whose buffers the next one takes over.
     spare: KeyFrame,
     scratch: Scratch,
@@ -164,6 +167,7 @@ impl Engine {
             pool: Arc::new(start_pool(config.threads, config.simd, config.worker_started)),
             newest: None,
             previous: None,
+            remembered: Vec::new(),
             spare: KeyFrame::default(),
             scratch: Scratch::default(),
             ladder: Ladder::new(config.method, config.pixels_per_degree),
@@ -199,7 +203,7 @@ impl Engine {
         let (pool, map) = (Arc::clone(&self.pool), &self.scratch.map);
         let backend = &mut self.backend;
         pool.install(|| {
-            for key in self.previous.iter().chain(&self.newest) {
+            for key in self.remembered.iter().rev().chain(&self.previous).chain(&self.newest) {
                 backend.take_key(&pool, method.warp(), key, map);
             }
         });
@@ -315,15 +319,33 @@ impl Engine {
         }
         let newest = self.newest.replace(key);
         let dropped = std::mem::replace(&mut self.previous, newest);
-        self.spare = dropped.unwrap_or_default();
+        self.spare = dropped.and_then(|dropped| self.remember(dropped)).unwrap_or_default();
         if input.is_cut {
             self.spare = self.previous.take().unwrap_or_default();
+            self.remembered.clear();
         }
         Ok(KeyReport {
             work: (self.config.timer)() - started_at,
             motion,
             depth_contradiction: noticed.depth_contradiction,
         })
+    }
+
+    /// Keeps `key`, the one before the previous key, where holes may show it. Returns a key that is
+    /// no longer needed.
+    fn remember(&mut self, key: KeyFrame) -> Option<KeyFrame> {
+        let cells = key.velocity.data().len();
+        // Of a key without depth or motion no hole shows anything, nor of what lies before it.
+        let is_useful = !key.depth.data().is_empty() && cells > 0;
+        if self.config.method.warp() != Method::Linear || !is_useful {
+            self.remembered.clear();
+            return Some(key);
+        }
+        self.remembered.insert(0, key);
+        let most = kept_keys(cells) - 1;
+        let last = self.remembered.get(most).is_some().then(|| self.remembered.swap_remove(most));
+        self.remembered.truncate(most);
+        last
     }
 
     /// Estimates the motion of `key`, which has none, from its picture and the newest one's.
@@ -462,7 +484,8 @@ impl Engine {
             let method = self.config.method.warp();
             let map = &self.scratch.map;
             let finish = self.finish.as_mut().zip(part).and_then(|(it, part)| it.split(part));
-            let frame = FrameInput { method, phase, newest: key, previous, map, finish };
+            let past: Vec<_> = previous.into_iter().chain(&self.remembered).collect();
+            let frame = FrameInput { method, phase, newest: key, past: &past, map, finish };
             self.backend.make(&self.pool, &frame, out, keeps)
         };
         if let Some((finish, part)) = self.finish.as_mut().zip(part).filter(|_| !is_finished) {

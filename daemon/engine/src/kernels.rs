@@ -53,7 +53,7 @@ pub const KERNELS: &[Kernel] = &[
     exact("fill/far_side", "far_side", Some(&FAR_SIDE)),
     exact("warp/resolve", "classify", Some(&CLASSIFY)),
     exact("warp/linear", "warp_linear", Some(&LINEAR)),
-    exact("warp/linear", "has_previous", Some(&PREVIOUS)),
+    exact("warp/linear", "linked_keys", Some(&PREVIOUS[0])),
     exact("warp/grid", "warp_grid", Some(&GRID)),
     exact("warp/voxel", "warp_voxel", Some(&VOXEL)),
     exact("warp/voxel", "older_part", Some(&VOXEL_OLDER)),

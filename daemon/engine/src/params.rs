@@ -61,6 +61,10 @@ pub struct FrameParams {
     pub ahead: i32,
     /// Its share in that frame, 1/256.
     pub older_weight: u32,
+    /// Of how many keys fields are held, and which of them in turn is the newest one's.
+    pub held_fields: u32,
+    /// See there.
+    pub newest_field: u32,
 }
 
 impl FrameParams {

@@ -82,7 +82,7 @@ pub(crate) fn warp(
         Method::Gather => warp_gather(&pool, key, &map, phase, &mut out),
         Method::Linear => {
             scratch.take_key(&pool, key);
-            warp_linear(&pool, key, None, &map, phase, &mut scratch, &mut out);
+            warp_linear(&pool, key, &[], &map, phase, &mut scratch, &mut out);
         }
         _ => panic!("{method} has tests of its own"),
     }

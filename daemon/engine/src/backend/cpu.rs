@@ -38,7 +38,8 @@ impl CpuBackend {
     /// Makes a picture after the key that was taken last into `out`, which has the size and format
     /// of the keys.
     pub fn make(&mut self, pool: &ThreadPool, frame: &FrameInput<'_>, out: &mut ColorPlane) {
-        let FrameInput { method, phase, newest: key, previous, map, .. } = *frame;
+        let FrameInput { method, phase, newest: key, past, map, .. } = *frame;
+        let previous = past.first().copied();
         match (method, previous) {
             (Method::Blend, Some(older)) => blend(pool, &older.color, &key.color, out),
             (Method::Voxel, Some(older)) => {
@@ -54,7 +55,7 @@ impl CpuBackend {
                     self.linear.take_velocity(pool, &self.effective);
                 }
                 // A phase other than 0 needs motion, and with motion `linear` has taken the key.
-                warp_linear(pool, key, previous, map, phase, &mut self.linear, out);
+                warp_linear(pool, key, past, map, phase, &mut self.linear, out);
             }
             _ => out.copy_from(&key.color),
         }

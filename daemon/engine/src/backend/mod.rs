@@ -31,8 +31,8 @@ pub struct FrameInput<'a> {
     pub phase: Phase,
     /// The newest key.
     pub newest: &'a KeyFrame,
-    /// The key before it; present with a method that interpolates.
-    pub previous: Option<&'a KeyFrame>,
+    /// The keys before it, from the newest on; at least one with a method that interpolates.
+    pub past: &'a [&'a KeyFrame],
     /// Where the cells of `newest`'s field lie.
     pub map: &'a FieldMap,
     /// What the picture is finished with, on a backend that can.

@@ -83,6 +83,12 @@ pub enum Slot {
     Color,
     /// Colour of the key before it.
     Older,
+    /// Colour of the key before that.
+    SecondOlder,
+    /// And of the one before.
+    ThirdOlder,
+    /// And of the one before.
+    FourthOlder,
     /// Velocity of the newest key.
     Velocity,
     /// Acceleration of the newest key.
@@ -111,7 +117,8 @@ pub enum Slot {
     BesideColumns,
     /// The broken cells.
     Broken,
-    /// Depth key of the key before, then how far the newest key's cells came since.
+    /// Of some keys in turn the depth key of each cell, then how far each came since the key before;
+    /// between two keys [`crate::warp::voxel::VoxelWords::past`].
     Was,
     /// Vertices of the mesh.
     Vertices,

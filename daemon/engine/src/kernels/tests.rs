@@ -12,7 +12,7 @@ use super::*;
 use crate::backend::shader::{Binding, COLOR, COMMON, FIELD, STRIP};
 use crate::params::FrameParams;
 use crate::warp::grid::TRIANGLE_BYTES;
-use crate::warp::linear::HOLES;
+use crate::warp::linear::{HOLES, LEVELS};
 use crate::warp::voxel::SURFACES;
 
 fn src() -> PathBuf {
@@ -20,7 +20,13 @@ fn src() -> PathBuf {
 }
 
 fn shaders() -> impl Iterator<Item = (&'static Kernel, &'static Shader)> {
-    KERNELS.iter().filter_map(|kernel| Some((kernel, kernel.shader?)))
+    let listed = KERNELS.iter().filter_map(|kernel| Some((kernel, kernel.shader?)));
+    listed.flat_map(|(kernel, shader)| {
+        // The same shader, for each of the keys before.
+        let is_previous = shader.file == PREVIOUS[0].file;
+        let others = if is_previous { &PREVIOUS[1..] } else { &[] };
+        std::iter::once(shader).chain(others).map(move |shader| (kernel, shader))
+    })
 }
 
 fn parse(shader: &Shader) -> naga::Module {
@@ -68,7 +74,8 @@ fn wgsl_files(folder: &Path, found: &mut BTreeSet<PathBuf>) {
 fn every_wgsl_file_is_part_of_a_shader_in_the_table() {
     let mut files = BTreeSet::new();
     wgsl_files(&src(), &mut files);
-    assert!(files.len() >= 3 + shaders().count(), "found only {files:?}");
+    let listed = KERNELS.iter().filter(|kernel| kernel.shader.is_some()).count();
+    assert!(files.len() >= 3 + listed, "found only {files:?}");
     for file in files {
         let text = fs::read_to_string(&file).unwrap();
         assert!(
@@ -82,7 +89,11 @@ fn every_wgsl_file_is_part_of_a_shader_in_the_table() {
         assert_eq!(shader.parts.last(), Some(&own.as_str()), "{}", shader.file);
         assert_eq!(shader.parts.first(), Some(&COMMON), "{}", shader.file);
         for part in &shader.parts[1..shader.parts.len() - 1] {
-            assert!([COLOR, FIELD, HOLES, SURFACES].contains(part), "{}", shader.file);
+            assert!(
+                [&[COLOR, FIELD, HOLES, SURFACES], &LEVELS[..]].concat().contains(part),
+                "{}",
+                shader.file
+            );
         }
     }
 }
@@ -191,7 +202,9 @@ fn the_parameters_lie_where_the_shaders_read_them() {
         older_size,
         older_cells,
         ahead,
-        older_weight
+        older_weight,
+        held_fields,
+        newest_field
     );
     let found: Vec<_> =
         members.iter().map(|member| (member.name.as_deref().unwrap(), member.offset)).collect();
@@ -233,6 +246,9 @@ fn constants_of_the_shaders_are_those_of_the_cpu() {
         ("STRIP", i64::from(STRIP)),
         ("DEPTH_SHIFT", i64::from(crate::warp::linear::DEPTH_SHIFT)),
         ("SAME_SURFACE_SHIFT", i64::from(crate::warp::voxel::SAME_SURFACE_SHIFT)),
+        ("MOST_KEYS", crate::warp::linear::MOST_KEYS as i64),
+        ("STEADY", i64::from(crate::warp::linear::STEADY)),
+        ("REACH", i64::from(crate::warp::linear::REACH)),
         ("GROUPS_OF_A_ROW", 1024),
         ("NO_TRIANGLE", i64::from(u32::MAX)),
         ("LANES", i64::from(LANES)),

@@ -19,6 +19,9 @@ pub(super) const TIMEOUT: Duration = Duration::from_secs(20);
 /// How long a device that has failed may take to say that it is lost.
 const LAST_WORDS: Duration = Duration::from_secs(1);
 
+/// The text of a shader, and the code of the colour format that it is compiled for.
+type ShaderKey = (&'static [&'static str], u32);
+
 /// An open device.
 #[derive(Debug)]
 pub struct Gpu {
@@ -29,7 +32,7 @@ pub struct Gpu {
     pub(super) queue: wgpu::Queue,
     /// The first thing that went wrong outside of any call.
     fault: Arc<Mutex<Option<GpuError>>>,
-    shaders: Mutex<BTreeMap<(&'static str, u32), Arc<Compiled>>>,
+    shaders: Mutex<BTreeMap<ShaderKey, Arc<Compiled>>>,
 }
 
 /// A shader as the device runs it.
@@ -176,7 +179,7 @@ impl Gpu {
         shader: &'static Shader,
         format: ColorFormat,
     ) -> Result<Arc<Compiled>, GpuError> {
-        let key = (shader.file, format_code(format));
+        let key = (shader.parts, format_code(format));
         let mut shaders = self.shaders.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(compiled) = shaders.get(&key) {
             return Ok(Arc::clone(compiled));

@@ -41,7 +41,7 @@ use crate::trajectory::effective::EFFECTIVE;
 use crate::warp::blend::BLEND;
 use crate::warp::gather::GATHER;
 use crate::warp::grid::{GRID, LANES, MeshWords, TRIANGLE_BYTES};
-use crate::warp::linear::{LINEAR, PREVIOUS, came, has_previous};
+use crate::warp::linear::{LINEAR, OLDER_COLORS, PREVIOUS, kept_keys, linked_keys};
 use crate::warp::resolve::{CLASSIFY, RESOLVE};
 use crate::warp::scatter::{SCATTER, SOURCE};
 use crate::warp::voxel::{Between, VOXEL, VOXEL_OLDER, VoxelWords};
@@ -87,10 +87,10 @@ fn unmoved_shaders(method: Method) -> &'static [&'static Shader] {
     }
 }
 
-/// The shaders that fill its holes from the key before, where that may be.
+/// The shaders that fill its holes from the keys before, one for each where that may be.
 fn filling_shaders(method: Method) -> &'static [&'static Shader] {
     match method {
-        Method::Linear => &[&PREVIOUS],
+        Method::Linear => &[&PREVIOUS[0], &PREVIOUS[1], &PREVIOUS[2], &PREVIOUS[3]],
         _ => &[],
     }
 }
@@ -128,9 +128,9 @@ pub(crate) struct GpuBackend {
     tables: Vec<u32>,
     /// How far tiles are blurred, as the shader reads it.
     weights: Vec<u32>,
-    /// Depth of the newest key that went up, and of the one before: [`Slot::Was`] begins with that.
-    depth: Vec<u32>,
-    was: Vec<u32>,
+    /// Of how many keys [`Slot::Was`] holds fields, and which of them is the newest one's.
+    held_fields: u32,
+    newest_field: u32,
     mesh: MeshWords,
     voxel: VoxelWords,
 }
@@ -166,8 +166,8 @@ impl GpuBackend {
             spares: Spares::default(),
             tables: Vec::new(),
             weights: Vec::new(),
-            depth: Vec::new(),
-            was: Vec::new(),
+            held_fields: 1,
+            newest_field: 0,
             mesh: MeshWords::default(),
             voxel: VoxelWords::default(),
         })
@@ -189,14 +189,19 @@ impl GpuBackend {
         }
         let gpu = Arc::clone(&self.gpu);
         gpu.guard(|| {
-            if matches!(self.method, Method::Blend | Method::Voxel | Method::Linear) {
-                self.planes.swap(Slot::Color, Slot::Older);
-            }
-            if self.method == Method::Linear {
-                self.send_past(key)?;
+            let kept = match self.method {
+                Method::Blend | Method::Voxel => 1,
+                Method::Linear => kept_keys(key.velocity.data().len()),
+                _ => 0,
+            };
+            for slot in &OLDER_COLORS[..kept] {
+                self.planes.swap(Slot::Color, *slot);
             }
             if self.method != Method::Blend && moves {
                 self.send_field(key, map)?;
+            }
+            if self.method == Method::Linear && !key.depth.data().is_empty() {
+                self.keep_field(key)?;
             }
             self.send_color(key)
         })
@@ -250,18 +255,25 @@ impl GpuBackend {
         Ok(())
     }
 
-    /// Sends what holes after `key` read of the key before, whose depth is at hand.
-    fn send_past(&mut self, key: &KeyFrame) -> Result<(), GpuError> {
+    /// Keeps the field of `key`, which has gone up, for holes after it and after later keys.
+    fn keep_field(&mut self, key: &KeyFrame) -> Result<(), GpuError> {
         let gpu = Arc::clone(&self.gpu);
-        std::mem::swap(&mut self.depth, &mut self.was);
-        self.depth.clear();
-        self.depth.extend_from_slice(key.depth.data());
-        if self.was.len() == self.depth.len() && !self.was.is_empty() {
-            let cells = self.was.as_bytes().len() as u64;
-            let past = self.planes.sized(&gpu, Slot::Was, 2 * cells)?;
-            gpu.queue.write_buffer(past, 0, self.was.as_bytes());
-            gpu.queue.write_buffer(past, cells, came(key).data().as_bytes());
+        let cells = key.depth.data().len();
+        let bytes = 4 * cells as u64;
+        self.held_fields = kept_keys(cells) as u32 + 1;
+        self.newest_field = (self.newest_field + 1) % self.held_fields;
+        let place = u64::from(self.newest_field) * 2 * bytes;
+        self.planes.sized(&gpu, Slot::Was, u64::from(self.held_fields) * 2 * bytes)?;
+        let was = self.planes.held(Slot::Was)?;
+        let mut commands = gpu.device.create_command_encoder(&Default::default());
+        commands.copy_buffer_to_buffer(self.planes.held(Slot::Depth)?, 0, was, place, bytes);
+        if key.came.data().is_empty() {
+            let velocity = self.planes.held(Slot::Velocity)?;
+            commands.copy_buffer_to_buffer(velocity, 0, was, place + bytes, bytes);
+        } else {
+            gpu.queue.write_buffer(was, place + bytes, key.came.data().as_bytes());
         }
+        gpu.queue.submit([commands.finish()]);
         Ok(())
     }
 
@@ -288,7 +300,12 @@ impl GpuBackend {
     }
 
     fn params(&self, key: &KeyFrame, map: &FieldMap, phase: Phase) -> FrameParams {
-        FrameParams { mesh_cells: self.mesh.cells, ..FrameParams::new(key, map, phase) }
+        FrameParams {
+            mesh_cells: self.mesh.cells,
+            held_fields: self.held_fields,
+            newest_field: self.newest_field,
+            ..FrameParams::new(key, map, phase)
+        }
     }
 
     /// Gives every plane that only shaders write its size.
@@ -310,6 +327,9 @@ impl GpuBackend {
                     Slot::Nearest | Slot::Shown => 4 * area(params.size),
                     Slot::Color
                     | Slot::Older
+                    | Slot::SecondOlder
+                    | Slot::ThirdOlder
+                    | Slot::FourthOlder
                     | Slot::Velocity
                     | Slot::Acceleration
                     | Slot::Depth
@@ -375,7 +395,7 @@ impl GpuBackend {
         let gpu = Arc::clone(&self.gpu);
         gpu.guard(|| {
             let mut params = self.params(frame.newest, frame.map, frame.phase);
-            let older = frame.previous.filter(|_| self.method == Method::Voxel);
+            let older = frame.past.first().filter(|_| self.method == Method::Voxel);
             let mut is_unmoved = false;
             if let Some(older) = older {
                 let between = Between { older, newer: frame.newest, phase: frame.phase };
@@ -404,9 +424,8 @@ impl GpuBackend {
             }
             let steps = if is_unmoved { &self.unmoved_steps } else { &self.frame_steps };
             dispatch(&gpu, &mut commands, steps, &self.planes, &params)?;
-            if frame.previous.is_some_and(|older| has_previous(frame.newest, older)) {
-                dispatch(&gpu, &mut commands, &self.filling_steps, &self.planes, &params)?;
-            }
+            let linked = linked_keys(frame.newest, frame.past).min(self.filling_steps.len());
+            dispatch(&gpu, &mut commands, &self.filling_steps[..linked], &self.planes, &params)?;
             if frame.finish.is_some() {
                 dispatch(&gpu, &mut commands, &self.finish_steps, &self.planes, &params)?;
             }

@@ -52,13 +52,13 @@ fn phases() -> impl Iterator<Item = Phase> {
 }
 
 fn on_cpu(method: Method, keys: &[&KeyFrame], phase: Phase) -> ColorPlane {
-    let [older, newest] = [keys[0], keys[keys.len() - 1]];
+    let (newest, past) = newest_and_past(keys);
     let pool = pool(1);
     let map = map_of_moving(newest);
     let mut cpu = CpuBackend::default();
     cpu.take_key(&pool, method, newest);
     let mut out = newest.color.clone();
-    cpu.make(&pool, &input(method, phase, older, newest, &map), &mut out);
+    cpu.make(&pool, &input(method, phase, &past, newest, &map), &mut out);
     out
 }
 
@@ -68,7 +68,7 @@ fn on_gpu(
     keys: &[&KeyFrame],
     phases: impl Iterator<Item = Phase>,
 ) -> Vec<ColorPlane> {
-    let [older, newest] = [keys[0], keys[keys.len() - 1]];
+    let (newest, past) = newest_and_past(keys);
     let mut backend = GpuBackend::new(gpu, newest.color.format(), method, false).unwrap();
     for key in keys {
         backend.take_key(key, &map_of_moving(key)).unwrap();
@@ -76,7 +76,7 @@ fn on_gpu(
     let map = map_of_moving(newest);
     let make = |phase| {
         let mut out = newest.color.clone();
-        backend.make(&input(method, phase, older, newest, &map), &mut out, false).unwrap();
+        backend.make(&input(method, phase, &past, newest, &map), &mut out, false).unwrap();
         out
     };
     phases.map(make).collect()
@@ -89,11 +89,16 @@ fn map_of_moving(key: &KeyFrame) -> FieldMap {
 fn input<'a>(
     method: Method,
     phase: Phase,
-    older: &'a KeyFrame,
+    past: &'a [&'a KeyFrame],
     newest: &'a KeyFrame,
     map: &'a FieldMap,
 ) -> FrameInput<'a> {
-    FrameInput { method, phase, newest, previous: Some(older), map, finish: None }
+    FrameInput { method, phase, newest, past, map, finish: None }
+}
+
+/// The last of `keys`, and the others from the newest on.
+fn newest_and_past<'a>(keys: &[&'a KeyFrame]) -> (&'a KeyFrame, Vec<&'a KeyFrame>) {
+    (keys[keys.len() - 1], keys[..keys.len() - 1].iter().rev().copied().collect())
 }
 
 /// The first byte in which two pictures differ.
@@ -116,34 +121,43 @@ fn assert_same(gpu: &Arc<Gpu>, method: Method, key: &KeyFrame, what: &str) {
 }
 
 #[test]
-fn every_adapter_fills_holes_from_the_key_before_as_the_cpu_does() {
+fn every_adapter_fills_holes_from_the_keys_before_as_the_cpu_does() {
     let cases = [([64, 40], [64, 40], 6), ([213, 120], [142, 80], 20), ([213, 120], [54, 30], 40)];
-    for gpu in test_gpus("every_adapter_fills_holes_from_the_key_before_as_the_cpu_does") {
-        for (seed, (size, cells, reach)) in (0..).zip(cases) {
-            for format in FORMATS {
-                let of = |seed: u32| {
-                    key(
-                        noise(format, size[0], size[1], seed),
-                        depth_noise(cells[0], cells[1], 3),
-                        velocity_noise(cells[0], cells[1], reach, seed),
-                    )
-                };
-                let older = KeyFrame { content_time: MonoTime::ZERO, ..of(seed + 10) };
-                let newest =
-                    KeyFrame { came: velocity_noise(cells[0], cells[1], 1, 2), ..of(seed) };
-                let unlike = KeyFrame { motion_from: None, ..older.clone() };
-                let mut is_filled = false;
-                let keys = [&older, &newest];
-                let pictures = on_gpu(&gpu, Method::Linear, &keys, phases());
-                for (phase, picture) in phases().zip(pictures) {
-                    let expected = on_cpu(Method::Linear, &keys, phase);
-                    let found = difference(&picture, &expected);
-                    assert_eq!(found, None, "{size:?} over {cells:?}, {format:?}");
-                    let without = on_cpu(Method::Linear, &[&unlike, &newest], phase);
-                    is_filled |= difference(&expected, &without).is_some();
+    for gpu in test_gpus("every_adapter_fills_holes_from_the_keys_before_as_the_cpu_does") {
+        for ((seed, (size, cells, reach)), format) in (0..).zip(cases).zip(FORMATS) {
+            // One place, before which something nearer comes and goes; it hardly moves.
+            let came = |age: u32| {
+                let step = |x: u32, salt: u32| (hash(x / 9, salt, age) % 5) as i16 - 2;
+                plane(cells[0], cells[1], |x, y| Velocity { x: step(x, 1), y: step(y, 2) })
+            };
+            let place = depth_noise(cells[0], cells[1], 3);
+            let of = |age: u32| {
+                let is_hidden = |x: u32, y: u32| hash(x / 6, y / 6, age).is_multiple_of(3);
+                let depth = plane(cells[0], cells[1], |x, y| {
+                    if is_hidden(x, y) { u32::MAX - 1 } else { place.at(x, y) }
+                });
+                let velocity = velocity_noise(cells[0], cells[1], reach, seed + age);
+                let time = |age: u32| MonoTime::from_ns(100 - u64::from(age));
+                KeyFrame {
+                    content_time: time(age),
+                    motion_from: Some(time(age + 1)),
+                    came: came(age),
+                    ..key(noise(format, size[0], size[1], seed + age), depth, velocity)
                 }
-                assert!(is_filled, "the key before makes a difference");
+            };
+            let keys = [7, 6, 5, 4, 3, 2, 1, 0].map(of);
+            let all: Vec<_> = keys.iter().collect();
+            let mut differs = [false; 2];
+            for (phase, picture) in phases().zip(on_gpu(&gpu, Method::Linear, &all, phases())) {
+                let expected = on_cpu(Method::Linear, &all, phase);
+                let found = difference(&picture, &expected);
+                assert_eq!(found, None, "{size:?} over {cells:?}, {format:?}");
+                for (differs, kept) in differs.iter_mut().zip([0, 1]) {
+                    let fewer = on_cpu(Method::Linear, &all[7 - kept..], phase);
+                    *differs |= difference(&expected, &fewer).is_some();
+                }
             }
+            assert_eq!(differs, [true; 2], "the keys before make a difference");
         }
     }
 }
@@ -320,7 +334,7 @@ fn a_picture_that_stays_on_its_device_is_the_one_that_would_come_back_whatever_f
         backend.take_key(&newest, &map).unwrap();
         let mut out = newest.color.clone();
         let mut make = |phase, keeps| {
-            let input = input(Method::Linear, phase, &newest, &newest, &map);
+            let input = input(Method::Linear, phase, &[], &newest, &map);
             backend.make(&input, &mut out, keeps).unwrap()
         };
         let phases: Vec<_> = phases().collect();
@@ -391,7 +405,7 @@ fn a_step_before_its_key_is_an_error() {
         let mut out = key.color.clone();
         let map = FieldMap::default();
         let made =
-            backend.make(&input(Method::Blend, Phase::ZERO, &key, &key, &map), &mut out, false);
+            backend.make(&input(Method::Blend, Phase::ZERO, &[&key], &key, &map), &mut out, false);
         assert!(matches!(made, Err(GpuError::Refused { .. })), "{made:?}");
     }
 }
@@ -445,7 +459,7 @@ fn every_adapter_finishes_as_the_cpu_does() {
                     let split = finish.split(part);
                     let frame = FrameInput {
                         finish: split,
-                        ..input(Method::Gather, phase, &key, &key, &map)
+                        ..input(Method::Gather, phase, &[], &key, &map)
                     };
                     let mut made = key.color.clone();
                     backend.make(&frame, &mut made, false).unwrap();

@@ -8,6 +8,7 @@ mod avx2;
 
 use super::cpu::Frame;
 use super::fill::{FarSurface, HolePlace, far_surface, hole_place};
+use super::previous::Way;
 use crate::key::Velocity;
 #[cfg(target_arch = "x86_64")]
 use crate::simd::has_avx2;
@@ -19,6 +20,10 @@ const CLASSES: usize = 32;
 /// Cells of a 3x3 neighbourhood.
 const NEIGHBOURS: usize = 9;
 
+/// A pixel that is read in a key before the newest: its column, the key, counted from 0, and the
+/// place.
+pub(super) type OlderPixel = (u16, u8, [i32; 2]);
+
 /// The pixels of a row that lie in broken cells, from left to right.
 #[derive(Debug, Default)]
 pub(super) struct BrokenRow {
@@ -26,8 +31,8 @@ pub(super) struct BrokenRow {
     pixels: Vec<[u16; 2]>,
     /// Where each is read, Q8 pixels.
     places: Vec<[i32; 2]>,
-    /// Those that are read in the key before, and where.
-    older: Vec<(u16, [i32; 2])>,
+    /// Those that are read in keys before: column, which key, and where.
+    older: Vec<OlderPixel>,
 }
 
 impl BrokenRow {
@@ -67,8 +72,8 @@ impl BrokenRow {
         }
     }
 
-    /// The pixels that are read in the key before: column and place.
-    pub(super) fn older(&self) -> impl Iterator<Item = (u16, [i32; 2])> {
+    /// The pixels that are read in keys before.
+    pub(super) fn older(&self) -> impl Iterator<Item = OlderPixel> {
         self.older.iter().copied()
     }
 
@@ -109,25 +114,34 @@ struct Holes<'a> {
     cell_y: u32,
     /// The cell that was looked at last, and what its holes continue.
     last: Option<(u16, Option<FarSurface>)>,
+    /// Where that was in the keys before, once a hole has asked.
+    way: Option<Way>,
 }
 
 impl<'a> Holes<'a> {
     fn new(frame: &'a Frame<'a>, index_y: u32) -> Self {
-        Self { frame, index_y, cell_y: frame.map.y.cell_of(index_y), last: None }
+        Self { frame, index_y, cell_y: frame.map.y.cell_of(index_y), last: None, way: None }
     }
 
     /// Where the pixel in `column` and `cell`, to which no candidate comes, is read.
-    fn place(&mut self, [column, cell]: [u16; 2], older: &mut Vec<(u16, [i32; 2])>) -> [i32; 2] {
+    fn place(&mut self, [column, cell]: [u16; 2], older: &mut Vec<OlderPixel>) -> [i32; 2] {
         let far = match self.last {
             Some((last, far)) if last == cell => far,
-            _ => far_surface(self.frame, [u32::from(cell), self.cell_y]),
+            _ => {
+                self.way = None;
+                far_surface(self.frame, [u32::from(cell), self.cell_y])
+            }
         };
         self.last = Some((cell, far));
+        let (frame, cell_y, way) = (self.frame, self.cell_y, &mut self.way);
+        let way = |far: &FarSurface| {
+            *way.get_or_insert_with(|| frame.memory.way(frame, far, [u32::from(cell), cell_y]))
+        };
         let p = self.frame.centre([u32::from(column), self.index_y]);
-        match hole_place(self.frame, far, p) {
+        match hole_place(frame, far, way, p) {
             HolePlace::Key(place) => place,
-            HolePlace::Older(place) => {
-                older.push((column, place));
+            HolePlace::Older(key, place) => {
+                older.push((column, key, place));
                 p
             }
         }

@@ -7,7 +7,7 @@ use rayon::ThreadPool;
 use super::LinearScratch;
 use super::between::RowCells;
 use super::broken::BrokenRow;
-use super::previous::{Previous, came, has_previous};
+use super::previous::{MOST_KEYS, Memory, linked_keys};
 use crate::color::{ColorPlane, Texel};
 use crate::field::FieldMap;
 use crate::key::{KeyFrame, Velocity};
@@ -16,12 +16,12 @@ use crate::plane::{Plane, Rect};
 use crate::warp::for_each_valid_row;
 use crate::warp::sample::{Listed, sample, sample_run};
 
-/// Warps `key` to `phase` into `out`, which has the key's size and format. `previous` is the key
-/// before, `map` the map of the key's field grid; `scratch` has taken the key.
+/// Warps `key` to `phase` into `out`, which has the key's size and format. `past` are the keys before
+/// it, from the newest on, `map` is the map of the key's field grid; `scratch` has taken the key.
 pub fn warp_linear(
     pool: &ThreadPool,
     key: &KeyFrame,
-    previous: Option<&KeyFrame>,
+    past: &[&KeyFrame],
     map: &FieldMap,
     phase: Phase,
     scratch: &mut LinearScratch,
@@ -32,22 +32,46 @@ pub fn warp_linear(
         return;
     }
     scratch.resolve(pool, map, phase);
-    let previous = previous.filter(|older| has_previous(key, older));
     let mut frame = Frame::new(scratch, map, key.valid, phase);
-    frame.previous = previous.map(|older| Previous { depth: &older.depth, came: came(key) });
-    let older = previous.map_or(&key.color, |older| &older.color);
-    match (&key.color, older, out) {
-        (ColorPlane::Rgba8(color), ColorPlane::Rgba8(older), ColorPlane::Rgba8(out)) => {
-            gather(pool, &frame, [color, older], out);
+    frame.memory = Memory::of(key, past);
+    let past = &past[..linked_keys(key, past)];
+    match (&key.color, out) {
+        (ColorPlane::Rgba8(color), ColorPlane::Rgba8(out)) => {
+            let older = planes(color, past, |color| match color {
+                ColorPlane::Rgba8(plane) => Some(plane),
+                _ => None,
+            });
+            gather(pool, &frame, color, older, out);
         }
-        (ColorPlane::Rgb10a2(color), ColorPlane::Rgb10a2(older), ColorPlane::Rgb10a2(out)) => {
-            gather(pool, &frame, [color, older], out);
+        (ColorPlane::Rgb10a2(color), ColorPlane::Rgb10a2(out)) => {
+            let older = planes(color, past, |color| match color {
+                ColorPlane::Rgb10a2(plane) => Some(plane),
+                _ => None,
+            });
+            gather(pool, &frame, color, older, out);
         }
-        (ColorPlane::Rgba16f(color), ColorPlane::Rgba16f(older), ColorPlane::Rgba16f(out)) => {
-            gather(pool, &frame, [color, older], out);
+        (ColorPlane::Rgba16f(color), ColorPlane::Rgba16f(out)) => {
+            let older = planes(color, past, |color| match color {
+                ColorPlane::Rgba16f(plane) => Some(plane),
+                _ => None,
+            });
+            gather(pool, &frame, color, older, out);
         }
         _ => unreachable!("the engine gives the output the format of the key"),
     }
+}
+
+/// The colour of each key of `past`, and `color` where there are no more.
+fn planes<'a, T>(
+    color: &'a Plane<T>,
+    past: &[&'a KeyFrame],
+    of: impl Fn(&'a ColorPlane) -> Option<&'a Plane<T>>,
+) -> [&'a Plane<T>; MOST_KEYS] {
+    let mut planes = [color; MOST_KEYS];
+    for (plane, older) in planes.iter_mut().zip(past.iter().filter_map(|key| of(&key.color))) {
+        *plane = older;
+    }
+    planes
 }
 
 /// Mean of a cell's width and height, Q8 pixels.
@@ -65,8 +89,8 @@ pub(super) struct Frame<'a> {
     pub(super) phase: Phase,
     /// Mean of a cell's width and height, Q8 pixels.
     pub(super) one_cell: i32,
-    /// The key before, where holes may be filled from that.
-    pub(super) previous: Option<Previous<'a>>,
+    /// The keys before, as far as holes may be filled from them.
+    pub(super) memory: Memory<'a>,
 }
 
 /// The surface that the key shows at a place.
@@ -79,7 +103,8 @@ pub(super) struct Surface {
 fn gather<T: Texel>(
     pool: &ThreadPool,
     frame: &Frame<'_>,
-    [color, older]: [&Plane<T>; 2],
+    color: &Plane<T>,
+    older: [&Plane<T>; MOST_KEYS],
     out: &mut Plane<T>,
 ) {
     for_each_valid_row(
@@ -88,7 +113,7 @@ fn gather<T: Texel>(
         color,
         out,
         #[inline(always)]
-        |index_y, row| gather_row(frame, [color, older], index_y, row),
+        |index_y, row| gather_row(frame, color, older, index_y, row),
     );
 }
 
@@ -110,7 +135,8 @@ thread_local! {
 #[inline(always)]
 fn gather_row<T: Texel>(
     frame: &Frame<'_>,
-    [color, older]: [&Plane<T>; 2],
+    color: &Plane<T>,
+    older: [&Plane<T>; MOST_KEYS],
     index_y: u32,
     row: &mut [T],
 ) {
@@ -124,8 +150,8 @@ fn gather_row<T: Texel>(
         let broken = scratch.broken.take(&mut rest, first + texels.len() as u32);
         gather_block(frame, color, &scratch.cells, broken, [first, index_y], texels);
     }
-    for (column, place) in scratch.broken.older() {
-        row[column as usize] = sample(older, frame.valid, place[0], place[1]);
+    for (column, key, [x, y]) in scratch.broken.older() {
+        row[column as usize] = sample(older[usize::from(key)], frame.valid, x, y);
     }
     ROW.set(scratch);
 }
@@ -174,7 +200,7 @@ impl<'a> Frame<'a> {
             [field.class.width(), field.class.height()],
         ];
         assert_eq!(sizes, [cells; 4], "every plane of the field has the size of its grid");
-        Self { field, map, valid, phase, one_cell: one_cell(map), previous: None }
+        Self { field, map, valid, phase, one_cell: one_cell(map), memory: Memory::default() }
     }
 
     /// Centre of a pixel that is counted from the top left of the valid rectangle, Q8.

@@ -1,6 +1,7 @@
 //! What a hole shows: (3) to (5) of [`super`].
 
 use super::cpu::Frame;
+use super::previous::Way;
 use crate::fill::far_side::NO_CELL;
 use crate::warp::displacement;
 use crate::warp::scatter::{NO_SOURCE, source_of};
@@ -9,7 +10,7 @@ use crate::warp::scatter::{NO_SOURCE, source_of};
 #[derive(Clone, Copy)]
 pub(super) struct FarSurface {
     /// The cell, and the source that it shows.
-    cell: u32,
+    pub(super) cell: u32,
     pub(super) source: u32,
     pub(super) depth: u32,
     displacement: [i32; 2],
@@ -27,8 +28,13 @@ pub(super) fn far_surface(frame: &Frame<'_>, cell: [u32; 2]) -> Option<FarSurfac
     })
 }
 
-/// Where pixel centre `p` of a hole is read.
-pub(super) fn hole_place(frame: &Frame<'_>, far: Option<FarSurface>, p: [i32; 2]) -> HolePlace {
+/// Where pixel centre `p` of a hole is read; `way` says where its far surface was.
+pub(super) fn hole_place(
+    frame: &Frame<'_>,
+    far: Option<FarSurface>,
+    way: impl FnOnce(&FarSurface) -> Way,
+    p: [i32; 2],
+) -> HolePlace {
     let Some(far) = far else { return HolePlace::Key(p) };
     let [dx, dy] = far.displacement;
     // (3)
@@ -37,10 +43,9 @@ pub(super) fn hole_place(frame: &Frame<'_>, far: Option<FarSurface>, p: [i32; 2]
         return HolePlace::Key(far_place(frame, q, far.depth));
     }
     // (4)
-    let older = frame.previous.as_ref();
-    let older = older.and_then(|older| older.place(frame, &far, [p[0] - dx, p[1] - dy]));
-    if let Some(place) = older {
-        return HolePlace::Older(place);
+    let seen = frame.memory.place(frame, &way(&far), [p[0] - dx, p[1] - dy]);
+    if let Some((key, place)) = seen {
+        return HolePlace::Older(key, place);
     }
     // (5)
     HolePlace::Key(stretched(frame, far, p))
@@ -50,8 +55,8 @@ pub(super) fn hole_place(frame: &Frame<'_>, far: Option<FarSurface>, p: [i32; 2]
 pub(super) enum HolePlace {
     /// In the key.
     Key([i32; 2]),
-    /// In the key before.
-    Older([i32; 2]),
+    /// In a key before, counted from 0.
+    Older(u8, [i32; 2]),
 }
 
 /// (5).

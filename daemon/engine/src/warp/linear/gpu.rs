@@ -1,5 +1,6 @@
 //! The shaders of [`super`].
 
+use super::previous::MOST_KEYS;
 use crate::backend::shader::{Binding, COLOR, COMMON, Entry, Extent, FIELD, Shader, Slot};
 
 /// Text that both share: which surface a pixel of a broken cell shows, and which a hole continues.
@@ -26,20 +27,38 @@ pub const LINEAR: Shader = Shader {
     ],
 };
 
-/// Equation (4), over what [`LINEAR`] made.
-pub const PREVIOUS: Shader = Shader {
-    file: "previous.wgsl",
-    parts: &[COMMON, FIELD, COLOR, HOLES, include_str!("previous.wgsl")],
-    cleared: &[],
-    bindings: &[
-        Binding::Read(Slot::Older),
-        Binding::Write(Slot::Out),
-        Binding::Read(Slot::Tables),
-        Binding::Read(Slot::Held),
-        Binding::Read(Slot::Near),
-        Binding::Read(Slot::Carried),
-        Binding::Read(Slot::Origin),
-        Binding::Read(Slot::Was),
-    ],
-    entries: &[Entry::tiles("fill_from_previous", Extent::Cells)],
-};
+/// Where the colours of the keys before are, from the newest on.
+pub const OLDER_COLORS: [Slot; MOST_KEYS] =
+    [Slot::Older, Slot::SecondOlder, Slot::ThirdOlder, Slot::FourthOlder];
+
+/// Which of the keys before each of [`PREVIOUS`] shows, counted from 0.
+pub const LEVELS: [&str; MOST_KEYS] = [
+    "override LEVEL: u32 = 0u;\n",
+    "override LEVEL: u32 = 1u;\n",
+    "override LEVEL: u32 = 2u;\n",
+    "override LEVEL: u32 = 3u;\n",
+];
+
+macro_rules! previous {
+    ($key:literal) => {
+        Shader {
+            file: "previous.wgsl",
+            parts: &[COMMON, FIELD, COLOR, HOLES, LEVELS[$key], include_str!("previous.wgsl")],
+            cleared: &[],
+            bindings: &[
+                Binding::Read(OLDER_COLORS[$key]),
+                Binding::Write(Slot::Out),
+                Binding::Read(Slot::Tables),
+                Binding::Read(Slot::Held),
+                Binding::Read(Slot::Near),
+                Binding::Read(Slot::Carried),
+                Binding::Read(Slot::Origin),
+                Binding::Read(Slot::Was),
+            ],
+            entries: &[Entry::tiles("fill_from_previous", Extent::Cells)],
+        }
+    };
+}
+
+/// Equation (4), over what [`LINEAR`] made: one shader for each of the keys before.
+pub const PREVIOUS: [Shader; MOST_KEYS] = [previous!(0), previous!(1), previous!(2), previous!(3)];

@@ -13,15 +13,15 @@
 //!                   out(p) = key(q) of that one
 //! (3) no such n:    a hole. f = the far side. q = p - d(v_f), clamped to the valid rectangle
 //!                   out(p) = key(q) where near(q) is not nearer than f
-//! (4) else          out(p) = before(q - D_f) where the key before has the depth of f there; D_f how
-//!                   far f came since
+//! (4) else          out(p) = before(q - D_f) of the newest key before that has the depth of f there;
+//!                   D_f how far f came since (`previous.rs`, the background memory)
 //! (5) else          out(p) = key's pixel where the pixel of f closest to p came from
 //! ```
 //!
 //! (2) asks the key itself whether the surface of a candidate is what p would show: a field coarser
 //! than colour, the 2x2 footprint and dilation all reach farther than surfaces do. (3) continues
 //! the far surface under what used to hide it; where it is still hidden in the key, (4) shows what
-//! the key before saw of it, and where that saw nothing either, (5) stretches its last visible
+//! the keys before saw of it, and where those saw nothing either, (5) stretches its last visible
 //! pixel. None reads between two pixels unless both are far, so a hole never shows the nearer
 //! surface.
 //!
@@ -39,6 +39,6 @@ mod scratch;
 mod tests;
 
 pub use cpu::{one_cell, warp_linear};
-pub use gpu::{HOLES, LINEAR, PREVIOUS};
-pub use previous::{DEPTH_SHIFT, came, has_previous};
+pub use gpu::{HOLES, LEVELS, LINEAR, OLDER_COLORS, PREVIOUS};
+pub use previous::{DEPTH_SHIFT, MOST_KEYS, REACH, STEADY, kept_keys, linked_keys};
 pub use scratch::LinearScratch;

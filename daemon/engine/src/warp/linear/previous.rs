@@ -1,4 +1,21 @@
-//! Where the key before shows what a hole would: (4) of [`super`].
+//! The background memory: where the keys before show what a hole would, (4) of [`super`].
+//!
+//! A surface that something nearer hides stays remembered in the keys that saw it, for
+//! [`kept_keys`] keys. With `D_k` how far the far surface f came since the k-th key before:
+//!
+//! ```text
+//! (a) D_1 = how far f came to the newest key
+//! (b) D_k = D_(k-1) + how far the surface came to key k - 1 that this shows where f was, or, as
+//!           what made the hole may have hidden it there, as close to that as possible on the side
+//!           away from the hole, within 32 cells and within 1/32 of the depth of f; none where that
+//!           differs from D_1 by more than half a pixel
+//! (c) the hole shows key k at q - D_k if that shows there the depth of f as key k - 1 has it, to
+//!     1/32, and every key after k something nearer
+//! ```
+//!
+//! So a key counts only where the surface itself led to it, and where those after it hid the place:
+//! one that shows something farther there has proved that f does not reach so far. The motion of
+//! every interval is the application's own, and nothing is sampled twice. Only holes pay.
 
 use super::cpu::Frame;
 use super::fill::{FarSurface, clamp, nearest_pixel};
@@ -10,18 +27,58 @@ use crate::plane::Plane;
 /// at 1/8 and nothing at 1/32.
 pub const DEPTH_SHIFT: u32 = 5;
 
-/// What holes read of the key before, beside its colour.
-pub(super) struct Previous<'a> {
+/// Keys before the newest that holes may show.
+pub const MOST_KEYS: usize = 4;
+
+/// Cells that (b) goes to find the surface in sight.
+pub const REACH: i32 = 32;
+
+/// How far a surface's motion over one interval may differ from that over the newest, 1/32 pixel.
+pub const STEADY: u16 = 16;
+
+/// Bytes that a device may be asked to hold of the fields of all keys, at 8 bytes a cell.
+const MOST_BYTES: usize = 1 << 27;
+
+/// How many keys before the newest holes may show, on a field of so many cells.
+#[must_use]
+pub const fn kept_keys(cells: usize) -> usize {
+    let held = MOST_BYTES / (8 * if cells == 0 { 1 } else { cells });
+    if held > MOST_KEYS {
+        MOST_KEYS
+    } else if held < 2 {
+        1
+    } else {
+        held - 1
+    }
+}
+
+/// What holes read of one key before the newest, beside its colour.
+#[derive(Clone, Copy)]
+struct Kept<'a> {
     /// Its depth, on a grid of the same size.
-    pub(super) depth: &'a Plane<u32>,
-    /// How far the newest key's surfaces came since.
-    pub(super) came: &'a Plane<Velocity>,
+    depth: &'a Plane<u32>,
+    /// How far the surfaces of the key after it came since.
+    came: &'a Plane<Velocity>,
+}
+
+/// The keys that holes after the newest may show, the one before it first.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Memory<'a> {
+    keys: [Option<Kept<'a>>; MOST_KEYS],
+}
+
+/// Where a far surface was in the keys before.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Way {
+    /// By key: how far it came since, 1/32 pixel, and its depth key.
+    steps: [([i32; 2], u32); MOST_KEYS],
+    count: usize,
 }
 
 /// Whether holes after `key` may show what `older`, the key before it, shows: its motion points
 /// back to it, and both have depth, motion and one geometry.
 #[must_use]
-pub fn has_previous(key: &KeyFrame, older: &KeyFrame) -> bool {
+fn has_previous(key: &KeyFrame, older: &KeyFrame) -> bool {
     let size = |key: &KeyFrame| {
         let (color, depth) = (&key.color, &key.depth);
         [color.width(), color.height(), depth.width(), depth.height()]
@@ -36,45 +93,128 @@ pub fn has_previous(key: &KeyFrame, older: &KeyFrame) -> bool {
         && key.valid == older.valid
 }
 
+/// Of `past`, the keys before `key` from the newest on, how many holes after `key` may show.
+#[must_use]
+pub fn linked_keys(key: &KeyFrame, past: &[&KeyFrame]) -> usize {
+    let newer = std::iter::once(key).chain(past.iter().copied());
+    let links = newer.zip(past).take(kept_keys(key.depth.data().len()));
+    links.take_while(|(key, older)| has_previous(key, older)).count()
+}
+
 /// How far the surfaces of `key` came since the key before.
 #[must_use]
-pub fn came(key: &KeyFrame) -> &Plane<Velocity> {
+fn came(key: &KeyFrame) -> &Plane<Velocity> {
     if key.came.data().is_empty() { &key.velocity } else { &key.came }
 }
 
-impl Previous<'_> {
-    /// Where it shows what the surface `far` shows at `q` of the newest key, behind something; Q8
-    /// pixels.
+impl<'a> Memory<'a> {
+    /// The memory of `key`; `past` are the keys before it, from the newest on.
+    pub(super) fn of(key: &'a KeyFrame, past: &[&'a KeyFrame]) -> Self {
+        let mut memory = Self::default();
+        let newer = std::iter::once(key).chain(past.iter().copied());
+        let links = newer.zip(past).take(linked_keys(key, past));
+        for (kept, (key, older)) in memory.keys.iter_mut().zip(links) {
+            *kept = Some(Kept { depth: &older.depth, came: came(key) });
+        }
+        memory
+    }
+
+    /// (a) and (b): where the surface `far` of the holes in `cell` was.
+    pub(super) fn way(&self, frame: &Frame<'_>, far: &FarSurface, cell: [u32; 2]) -> Way {
+        let mut way = Way::default();
+        let Some(first) = &self.keys[0] else { return way };
+        let width = frame.map.x.cells();
+        let centre = |[x, y]: [u32; 2]| [frame.map.x.centre(x), frame.map.y.centre(y)];
+        let from = centre([far.source % width, far.source / width]);
+        let step = away(centre(cell), centre([far.cell % width, far.cell / width]), frame.one_cell);
+        let mut total = [0; 2];
+        let mut depth = far.depth;
+        let mut came = first.came.data()[far.source as usize];
+        for (index, kept) in self.keys.iter().enumerate() {
+            if !came.is_trackable() || kept.is_none() {
+                break;
+            }
+            // 1/32 pixels in Q8.
+            total = [total[0] + (i32::from(came.x) << 3), total[1] + (i32::from(came.y) << 3)];
+            way.steps[index] = (total, depth);
+            way.count = index + 1;
+            let (Some(kept), Some(Some(next))) = (kept, self.keys.get(index + 1)) else { break };
+            let start = [from[0] - total[0], from[1] - total[1]];
+            let seen = |i: i32| {
+                let at = [start[0] + i * step[0], start[1] + i * step[1]];
+                cell_at(frame, at).filter(|cell| is_same(kept.depth.data()[*cell], depth))
+            };
+            // The cell beside something nearer has that one's motion: it is dilated.
+            let seen = (0..=REACH).find_map(|i| seen(i - 1).and(seen(i)));
+            let Some(seen) = seen else { break };
+            depth = kept.depth.data()[seen];
+            came = next.came.data()[seen];
+            if !is_steady(first.came.data()[far.source as usize], came) {
+                break;
+            }
+        }
+        way
+    }
+
+    /// (c): the key, counted from 0, and the place in it, Q8 pixels, that shows what the surface of
+    /// `way` shows at `q` of the newest key, behind something.
     pub(super) fn place(
         &self,
         frame: &Frame<'_>,
-        far: &FarSurface,
+        way: &Way,
         q: [i32; 2],
-    ) -> Option<[i32; 2]> {
-        let came = self.came.data()[far.source as usize];
-        if !came.is_trackable() {
-            return None;
+    ) -> Option<(u8, [i32; 2])> {
+        let steps = (0..).zip(&way.steps[..way.count]).zip(self.keys.iter().flatten());
+        for ((index, &(total, depth)), kept) in steps {
+            let q = [q[0] - total[0], q[1] - total[1]];
+            let seen = kept.depth.data()[cell_at(frame, q)?];
+            if !is_same(seen, depth) {
+                if seen > depth {
+                    continue;
+                }
+                return None;
+            }
+            let [x, y] = q.map(|q| q & !0xff);
+            let corners = [[x, y], [x + 256, y], [x, y + 256], [x + 256, y + 256]];
+            let mixes = corners.into_iter().any(|at| !kept.shows(frame, clamp(frame, at), depth));
+            return Some((index, if mixes { nearest_pixel(q) } else { q }));
         }
-        // 1/32 pixels in Q8.
-        let q = [q[0] - (i32::from(came.x) << 3), q[1] - (i32::from(came.y) << 3)];
-        if !self.shows(frame, q, far.depth) {
-            return None;
-        }
-        let [x, y] = q.map(|q| q & !0xff);
-        let corners = [[x, y], [x + 256, y], [x, y + 256], [x + 256, y + 256]];
-        let mixes = corners.into_iter().any(|at| !self.shows(frame, clamp(frame, at), far.depth));
-        Some(if mixes { nearest_pixel(q) } else { q })
+        None
     }
+}
 
+impl Kept<'_> {
     /// Whether it shows a surface of depth key `depth` at the pixel nearest to `q`.
     fn shows(&self, frame: &Frame<'_>, q: [i32; 2], depth: u32) -> bool {
-        // Left of or above the rectangle the difference wraps and is larger than any size.
-        let column = (((q[0] + 128) >> 8) - frame.valid.x.cast_signed()).cast_unsigned();
-        let row = (((q[1] + 128) >> 8) - frame.valid.y.cast_signed()).cast_unsigned();
-        if column >= frame.valid.width || row >= frame.valid.height {
-            return false;
-        }
-        let was = self.depth.at(frame.map.x.cell_of(column), frame.map.y.cell_of(row));
-        was.abs_diff(depth) <= (was.max(depth) >> DEPTH_SHIFT) + 1
+        cell_at(frame, q).is_some_and(|cell| is_same(self.depth.data()[cell], depth))
     }
+}
+
+/// The cell that holds the pixel nearest to `q`; None outside.
+fn cell_at(frame: &Frame<'_>, q: [i32; 2]) -> Option<usize> {
+    // Left of or above the rectangle the difference wraps and is larger than any size.
+    let column = (((q[0] + 128) >> 8) - frame.valid.x.cast_signed()).cast_unsigned();
+    let row = (((q[1] + 128) >> 8) - frame.valid.y.cast_signed()).cast_unsigned();
+    if column >= frame.valid.width || row >= frame.valid.height {
+        return None;
+    }
+    let (x, y) = (frame.map.x.cell_of(column), frame.map.y.cell_of(row));
+    Some(y as usize * frame.map.x.cells() as usize + x as usize)
+}
+
+/// Whether depth keys of two keys are of one surface.
+fn is_same(was: u32, depth: u32) -> bool {
+    was.abs_diff(depth) <= (was.max(depth) >> DEPTH_SHIFT) + 1
+}
+
+/// Whether two steps of a surface differ by [`STEADY`] at most.
+fn is_steady(a: Velocity, b: Velocity) -> bool {
+    a.x.abs_diff(b.x).max(a.y.abs_diff(b.y)) <= STEADY
+}
+
+/// A cell's step from `hole` on beyond `far`, along the axis in which they lie farther apart, down
+/// among equals.
+fn away(hole: [i32; 2], far: [i32; 2], one_cell: i32) -> [i32; 2] {
+    let [x, y] = [far[0] - hole[0], far[1] - hole[1]];
+    if x.abs() > y.abs() { [x.signum() * one_cell, 0] } else { [0, y.signum() * one_cell] }
 }

@@ -1,10 +1,14 @@
-// Holes that the key before shows (4), the twin of `previous.rs`: over the picture that
-// `linear.wgsl` made, with the colour of that key.
+// Holes that one of the keys before shows (4), the twin of `previous.rs`: over the picture that
+// `linear.wgsl` and the keys after that one made, with the colour of that key. `LEVEL`, a part of the
+// text of its own, says which key it is, counted from 0.
 
-// Depth keys of the key before, then how far the cells of the newest came since.
+// Of some keys in turn: depth keys, then how far the cells came since the key before.
 @group(0) @binding(8) var<storage, read> was: array<u32>;
 
 const DEPTH_SHIFT: u32 = 5u;
+const MOST_KEYS: u32 = 4u;
+const REACH: i32 = 32;
+const STEADY: i32 = 16;
 
 // An invocation for each cell.
 @compute @workgroup_size(16, 16)
@@ -17,45 +21,156 @@ fn fill_from_previous(@builtin(global_invocation_id) id: vec3<u32>) {
     if far == NO_CELL {
         return;
     }
-    let source = origin[far];
-    let depth = near[source];
-    let d = displacement(held[source]);
-    let came = was[params.cells.x * params.cells.y + source];
-    if came == HOLE {
+    let way = way_of(cell, far);
+    if way.count <= LEVEL {
         return;
     }
+    let source = origin[far];
+    let d = displacement(held[source]);
     let pixels = pixels_of(cell);
     for (var y = pixels.first.y; y < pixels.end.y; y++) {
         for (var x = pixels.first.x; x < pixels.end.x; x++) {
             let pixel = params.valid_start + vec2<u32>(x, y);
             let p = vec2<i32>(pixel << vec2<u32>(8u));
-            let q = p - d - velocity_of(came) * 8;
-            if shows(q, depth) && !find_surface(cell, p).is_there
-                && !is_far(clamp_valid(p - d), depth) {
-                write_out(pixel, sample(unmixed(q, depth)));
+            let q = p - d;
+            if is_first_seen(way, q) && !find_surface(cell, p).is_there
+                && !is_far(clamp_valid(q), near[source]) {
+                let place = unmixed(q - way.totals[LEVEL], way.depths[LEVEL]);
+                write_out(pixel, sample(place));
             }
         }
     }
 }
 
-// Whether the key before shows a surface of depth key `depth` at the pixel nearest to `q`.
-fn shows(q: vec2<i32>, depth: u32) -> bool {
+// Where a far surface was in the keys before: how far it came since, Q8 pixels, and its depth key.
+struct Way {
+    totals: array<vec2<i32>, MOST_KEYS>,
+    depths: array<u32, MOST_KEYS>,
+    count: u32,
+}
+
+// (a) and (b), as far as this key.
+fn way_of(cell: vec2<u32>, far: u32) -> Way {
+    var way: Way;
+    let source = origin[far];
+    let from_centre = centre(vec2<u32>(source % params.cells.x, source / params.cells.x));
+    let far_centre = centre(vec2<u32>(far % params.cells.x, far / params.cells.x));
+    let step = away(far_centre - centre(cell));
+    var total = vec2<i32>(0, 0);
+    var depth = near[source];
+    var came = came_to(0u, source);
+    for (var key = 0u; key <= LEVEL; key++) {
+        if came == HOLE {
+            break;
+        }
+        total += velocity_of(came) * 8;
+        way.totals[key] = total;
+        way.depths[key] = depth;
+        way.count = key + 1u;
+        if key == LEVEL {
+            break;
+        }
+        // The cell beside something nearer has that one's motion: it is dilated.
+        var before = seen_at(key, from_centre - total - step, depth);
+        var seen = NO_CELL;
+        for (var i = 0; i <= REACH; i++) {
+            let here = seen_at(key, from_centre - total + i * step, depth);
+            if before != NO_CELL && here != NO_CELL {
+                seen = here;
+                break;
+            }
+            before = here;
+        }
+        if seen == NO_CELL {
+            break;
+        }
+        depth = depth_in(key, seen);
+        came = came_to(key + 1u, seen);
+        let apart = abs(velocity_of(came) - velocity_of(came_to(0u, source)));
+        if max(apart.x, apart.y) > STEADY {
+            break;
+        }
+    }
+    return way;
+}
+
+// The cell at `q` in a key if that shows a surface of depth key `depth` there, else `NO_CELL`.
+fn seen_at(key: u32, q: vec2<i32>, depth: u32) -> u32 {
+    let cell = cell_at(q);
+    if cell == NO_CELL || !is_same(depth_in(key, cell), depth) {
+        return NO_CELL;
+    }
+    return cell;
+}
+
+// A cell's step on beyond the far side, along the axis in which that lies farther apart from the
+// hole, down among equals.
+fn away(apart: vec2<i32>) -> vec2<i32> {
+    if abs(apart.x) > abs(apart.y) {
+        return vec2<i32>(sign(apart.x) * params.one_cell, 0);
+    }
+    return vec2<i32>(0, sign(apart.y) * params.one_cell);
+}
+
+// Whether this key shows what the newest would at `q`, and every one after it something nearer.
+fn is_first_seen(way: Way, q: vec2<i32>) -> bool {
+    for (var key = 0u; key < LEVEL; key++) {
+        let cell = cell_at(q - way.totals[key]);
+        if cell == NO_CELL {
+            return false;
+        }
+        let depth = depth_in(key, cell);
+        if depth < way.depths[key] || is_same(depth, way.depths[key]) {
+            return false;
+        }
+    }
+    return shows(LEVEL, q - way.totals[LEVEL], way.depths[LEVEL]);
+}
+
+// Where the field of a key is: key 0 is the newest.
+fn field_of(key: u32) -> u32 {
+    let place = (params.newest_field + params.held_fields - key) % params.held_fields;
+    return place * 2u * params.cells.x * params.cells.y;
+}
+
+// How far a cell came since key `key` of those before, to the one after that.
+fn came_to(key: u32, cell: u32) -> u32 {
+    return was[field_of(key) + params.cells.x * params.cells.y + cell];
+}
+
+// The depth key of a cell in key `key` of those before.
+fn depth_in(key: u32, cell: u32) -> u32 {
+    return was[field_of(key + 1u) + cell];
+}
+
+// The cell that holds the pixel nearest to `q`; `NO_CELL` outside.
+fn cell_at(q: vec2<i32>) -> u32 {
     // Left of or above the rectangle the difference wraps and is larger than any size.
     let index = vec2<u32>((q + 128) >> vec2<u32>(8u)) - params.valid_start;
     if !is_inside(index, params.valid_size) {
-        return false;
+        return NO_CELL;
     }
-    let then = was[cell_index(vec2<u32>(place_x(index.x).cell, place_y(index.y).cell))];
-    let largest = max(then, depth);
-    return largest - min(then, depth) <= (largest >> DEPTH_SHIFT) + 1u;
+    return cell_index(vec2<u32>(place_x(index.x).cell, place_y(index.y).cell));
+}
+
+// Whether depth keys of two keys are of one surface.
+fn is_same(a: u32, b: u32) -> bool {
+    let largest = max(a, b);
+    return largest - min(a, b) <= (largest >> DEPTH_SHIFT) + 1u;
+}
+
+// Whether a key shows a surface of depth key `depth` at the pixel nearest to `q`.
+fn shows(key: u32, q: vec2<i32>, depth: u32) -> bool {
+    let cell = cell_at(q);
+    return cell != NO_CELL && is_same(depth_in(key, cell), depth);
 }
 
 // `q` itself where all the pixels around it are of that surface, else the nearest one, which is.
 fn unmixed(q: vec2<i32>, depth: u32) -> vec2<i32> {
     let low = q & vec2<i32>(~0xff);
-    let is_one = shows(clamp_valid(low), depth)
-        && shows(clamp_valid(low + vec2<i32>(256, 0)), depth)
-        && shows(clamp_valid(low + vec2<i32>(0, 256)), depth)
-        && shows(clamp_valid(low + vec2<i32>(256, 256)), depth);
+    let is_one = shows(LEVEL, clamp_valid(low), depth)
+        && shows(LEVEL, clamp_valid(low + vec2<i32>(256, 0)), depth)
+        && shows(LEVEL, clamp_valid(low + vec2<i32>(0, 256)), depth)
+        && shows(LEVEL, clamp_valid(low + vec2<i32>(256, 256)), depth);
     return select(nearest_pixel(q), q, is_one);
 }

@@ -1,5 +1,7 @@
 //! What the linear method shows where surfaces move apart.
 
+mod memory;
+
 use super::{LinearScratch, warp_linear};
 use crate::color::{ColorFormat, ColorPlane, Rgba8};
 use crate::key::KeyFrame;
@@ -184,7 +186,7 @@ fn wrong_pixels([older, newest]: &[KeyFrame; 2]) -> usize {
     let (pool, map) = (pool(2), map_of(newest));
     let (mut out, mut scratch) = (newest.color.clone(), LinearScratch::default());
     scratch.take_key(&pool, newest);
-    warp_linear(&pool, newest, Some(older), &map, Phase::ONE, &mut scratch, &mut out);
+    warp_linear(&pool, newest, &[older], &map, Phase::ONE, &mut scratch, &mut out);
     let out = words(&out);
     let places = (8..16).flat_map(|y| (24..32).map(move |x| (x, y)));
     places.filter(|(x, y)| out.at(*x, *y) != wall(*x, *y)).count()

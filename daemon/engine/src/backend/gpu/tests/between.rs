@@ -23,7 +23,7 @@ fn between(gpu: &Arc<Gpu>, older: &KeyFrame, newer: &KeyFrame) -> [Vec<ColorPlan
     let map = map_of_moving(newer);
     let make = |phase| {
         let mut out = newer.color.clone();
-        backend.make(&input(Method::Voxel, phase, older, newer, &map), &mut out, false).unwrap();
+        backend.make(&input(Method::Voxel, phase, &[older], newer, &map), &mut out, false).unwrap();
         out
     };
     let made = phases().map(make).collect();

@@ -13,7 +13,7 @@ use std::arch::x86_64::{
     _mm256_srai_epi32, _mm256_srli_epi32, _mm256_sub_epi32,
 };
 
-use super::{CLASSES, Holes, NEIGHBOURS};
+use super::{CLASSES, Holes, NEIGHBOURS, OlderPixel};
 use crate::field::FieldAxis;
 use crate::key::Velocity;
 use crate::plane::Plane;
@@ -56,7 +56,7 @@ pub(super) fn places(
     index_y: u32,
     pixels: &[[u16; 2]],
     places: &mut Vec<[i32; 2]>,
-    older: &mut Vec<(u16, [i32; 2])>,
+    older: &mut Vec<OlderPixel>,
 ) {
     let mut holes = Holes::new(frame, index_y);
     let cell_y = holes.cell_y;
