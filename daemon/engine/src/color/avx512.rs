@@ -9,13 +9,14 @@ use std::arch::x86_64::{
     __m512i, __mmask16, _MM_HINT_T0, _mm_cvtsi128_si32, _mm_extract_epi32, _mm_prefetch,
     _mm512_add_epi16, _mm512_add_epi32, _mm512_and_si512, _mm512_castsi512_si128,
     _mm512_cmpgt_epu32_mask, _mm512_dpwssd_epi32, _mm512_extracti32x4_epi32,
-    _mm512_i32gather_epi32, _mm512_loadu_si512, _mm512_mask_blend_epi32, _mm512_max_epi32,
-    _mm512_min_epi32, _mm512_mullo_epi16, _mm512_mullo_epi32, _mm512_or_si512, _mm512_packs_epi32,
-    _mm512_packus_epi16, _mm512_permutex2var_epi32, _mm512_set1_epi16, _mm512_set1_epi32,
-    _mm512_setzero_si512, _mm512_shuffle_epi32, _mm512_slli_epi32, _mm512_srai_epi32,
-    _mm512_srli_epi32, _mm512_storeu_si512, _mm512_sub_epi32, _mm512_unpackhi_epi8,
-    _mm512_unpackhi_epi16, _mm512_unpackhi_epi32, _mm512_unpacklo_epi8, _mm512_unpacklo_epi16,
-    _mm512_unpacklo_epi32, _mm512_xor_si512,
+    _mm512_i32gather_epi32, _mm512_loadu_si512, _mm512_mask_blend_epi32,
+    _mm512_mask_reduce_min_epi32, _mm512_max_epi32, _mm512_min_epi32, _mm512_mullo_epi16,
+    _mm512_mullo_epi32, _mm512_or_si512, _mm512_packs_epi32, _mm512_packus_epi16,
+    _mm512_permutex2var_epi32, _mm512_set1_epi16, _mm512_set1_epi32, _mm512_setzero_si512,
+    _mm512_shuffle_epi32, _mm512_slli_epi32, _mm512_srai_epi32, _mm512_srli_epi32,
+    _mm512_storeu_si512, _mm512_sub_epi32, _mm512_unpackhi_epi8, _mm512_unpackhi_epi16,
+    _mm512_unpackhi_epi32, _mm512_unpacklo_epi8, _mm512_unpacklo_epi16, _mm512_unpacklo_epi32,
+    _mm512_xor_si512,
 };
 
 use super::Rgba8;
@@ -95,7 +96,11 @@ pub(super) fn sample_each(
         // SAFETY: this function runs on AVX-512 alone, and the run is as long as `out`.
         let [x, y] = unsafe { positions.sixteen(i * LANES) };
         let (x, y) = (axes[0].between(x), axes[1].between(y));
-        let corners = match near_corners(plane, x.low, y.low) {
+        let wanted = positions.wanted(i * LANES);
+        if wanted == 0 {
+            continue;
+        }
+        let corners = match near_corners(plane, x.low, y.low, wanted) {
             Some(corners) => corners,
             None => far_corners(plane, [x.low, axes[0].high(x.low)], [y.low, axes[1].high(y.low)]),
         };
@@ -130,27 +135,34 @@ fn gather(plane: &Plane<Rgba8>, row: __m512i, column: __m512i) -> __m512i {
     unsafe { _mm512_i32gather_epi32::<4>(index, plane.data().as_ptr().cast()) }
 }
 
-/// The corners where all positions lie in two rows and within [`WINDOW`] columns.
+/// The corners where all positions that are wanted lie in two rows and within [`WINDOW`] columns.
 ///
 /// The pixel or row after the last valid one may be read, where its weight is 0.
 #[inline]
 #[target_feature(enable = "avx512f")]
-fn near_corners(plane: &Plane<Rgba8>, x: __m512i, y: __m512i) -> Option<Corners> {
-    // Positions most often go one way: the smallest is at one of the ends.
-    let [first, row] = [x, y].map(|low| {
-        let [head, tail] = ends(low);
-        head.min(tail)
-    });
+fn near_corners(
+    plane: &Plane<Rgba8>,
+    x: __m512i,
+    y: __m512i,
+    wanted: __mmask16,
+) -> Option<Corners> {
+    let (first, row) = if wanted == __mmask16::MAX {
+        // Positions most often go one way: the smallest is at one of the ends.
+        let ([head_x, tail_x], [head_y, tail_y]) = (ends(x), ends(y));
+        (head_x.min(tail_x), head_y.min(tail_y))
+    } else {
+        (_mm512_mask_reduce_min_epi32(wanted, x), _mm512_mask_reduce_min_epi32(wanted, y))
+    };
     let column = _mm512_sub_epi32(x, _mm512_set1_epi32(first));
     let below = _mm512_sub_epi32(y, _mm512_set1_epi32(row));
     let is_far = |offset: __m512i, last: usize| -> __mmask16 {
         _mm512_cmpgt_epu32_mask(offset, _mm512_set1_epi32(last as i32))
     };
     // The pixel after the last column is in the window, too.
-    if is_far(column, WINDOW - 2) | is_far(below, 1) != 0 {
+    if (is_far(column, WINDOW - 2) | is_far(below, 1)) & wanted != 0 {
         return None;
     }
-    let is_below = is_far(below, 0);
+    let is_below = is_far(below, 0) & wanted;
     let (width, last_row) = (plane.width() as usize, plane.height() as usize - 1);
     let after = _mm512_add_epi32(column, _mm512_set1_epi32(1));
     let read = |row: usize| {

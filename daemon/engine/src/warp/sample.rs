@@ -24,6 +24,12 @@ pub trait Positions {
     /// The processor has AVX-512 with 16-bit lanes, and the run has 16 pixels from `i` on.
     #[cfg(target_arch = "x86_64")]
     unsafe fn sixteen(&self, i: usize) -> [__m512i; 2];
+
+    /// A bit for each of the pixels from `i` on, of which the colour is used. The others' may be
+    /// any.
+    fn wanted(&self, _i: usize) -> u16 {
+        u16::MAX
+    }
 }
 
 /// Positions that were computed before: x and y of each pixel.

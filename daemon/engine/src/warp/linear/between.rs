@@ -13,7 +13,7 @@ use std::arch::x86_64::{__m256i, __m512i};
 
 use super::cpu::Frame;
 #[cfg(target_arch = "x86_64")]
-use crate::simd::{has_avx2, has_avx512};
+use crate::simd::has_avx2;
 use crate::warp::sample::Positions;
 
 /// Pixels of the widest step.
@@ -75,20 +75,21 @@ impl RowCells {
         (differs == 0).then_some(shared)
     }
 
-    /// (1): where `pixels` pixels from `first` on are read. In broken cells it is not used.
+    /// (1): where `pixels` pixels from `first` on are read; anything where a bit of `broken` is set.
     #[inline(always)]
     pub(super) fn positions<'a>(
         &'a self,
         frame: &'a Frame<'a>,
         [first, index_y]: [u32; 2],
         pixels: usize,
+        broken: u64,
     ) -> RowPositions<'a> {
         RowPositions {
             xs: &self.xs,
             ys: &self.ys,
             places: frame.map.x.before_each(first, pixels),
-            is_finer: self.is_finer,
             p: frame.centre([first, index_y]),
+            wanted: !broken,
         }
     }
 }
@@ -102,26 +103,8 @@ pub(super) struct RowPositions<'a> {
     places: &'a [[u16; 2]],
     /// Centre of the first pixel, Q8.
     p: [i32; 2],
-    is_finer: bool,
-}
-
-impl RowPositions<'_> {
-    /// All of them, into lists as long.
-    #[inline(always)]
-    pub(super) fn list(&self, xs: &mut [i32], ys: &mut [i32]) {
-        let mut done = 0;
-        #[cfg(target_arch = "x86_64")]
-        if has_avx512() && !self.is_finer {
-            // SAFETY: the processor has AVX-512, asked for just above.
-            done = unsafe { avx512::list(self, xs, ys) };
-        } else if has_avx2() && !self.is_finer {
-            // SAFETY: the processor has AVX2, asked for just above.
-            done = unsafe { avx2::list(self, xs, ys) };
-        }
-        for (i, (x, y)) in xs.iter_mut().zip(ys).enumerate().skip(done) {
-            [*x, *y] = self.at(i);
-        }
-    }
+    /// A bit for each pixel that is used.
+    wanted: u64,
 }
 
 impl Positions for RowPositions<'_> {
@@ -145,6 +128,11 @@ impl Positions for RowPositions<'_> {
     unsafe fn sixteen(&self, i: usize) -> [__m512i; 2] {
         // SAFETY: the caller has AVX-512.
         unsafe { avx512::positions(self, i) }
+    }
+
+    #[inline(always)]
+    fn wanted(&self, i: usize) -> u16 {
+        (self.wanted >> i) as u16
     }
 }
 

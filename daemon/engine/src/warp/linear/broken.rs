@@ -6,14 +6,17 @@
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 
-use super::cpu::Frame;
+use super::cpu::{BLOCK, Frame};
 use super::fill::{FarSurface, HolePlace, far_surface, hole_place};
 use super::previous::Way;
+use crate::color::Texel;
 use crate::key::Velocity;
+use crate::plane::{Plane, Rect};
 #[cfg(target_arch = "x86_64")]
 use crate::simd::has_avx2;
 use crate::warp::moved;
 use crate::warp::resolve::{CellClass, HOLE};
+use crate::warp::sample::Listed;
 
 /// Cells whose classes are looked at together.
 const CLASSES: usize = 32;
@@ -29,8 +32,8 @@ pub(super) type OlderPixel = (u16, u8, [i32; 2]);
 pub(super) struct BrokenRow {
     /// Column, counted from the left of the valid rectangle, and cell.
     pixels: Vec<[u16; 2]>,
-    /// Where each is read, Q8 pixels.
-    places: Vec<[i32; 2]>,
+    /// Where each is read, Q8 pixels, x and y.
+    places: [Vec<i32>; 2],
     /// Those that are read in keys before: column, which key, and where.
     older: Vec<OlderPixel>,
 }
@@ -40,7 +43,7 @@ impl BrokenRow {
     #[inline(always)]
     pub(super) fn update(&mut self, frame: &Frame<'_>, index_y: u32) {
         self.pixels.clear();
-        self.places.clear();
+        self.places.iter_mut().for_each(Vec::clear);
         self.older.clear();
         let classes = frame.field.class.row(frame.map.y.cell_of(index_y));
         for (group, classes) in classes.chunks(CLASSES).enumerate() {
@@ -68,7 +71,9 @@ impl BrokenRow {
             let [column, cell] = pixel.map(u32::from);
             let p = frame.centre([column, index_y]);
             let found = place(frame, [cell, holes.cell_y], p);
-            self.places.push(found.unwrap_or_else(|| holes.place(pixel, &mut self.older)));
+            let place = found.unwrap_or_else(|| holes.place(pixel, &mut self.older));
+            self.places[0].push(place[0]);
+            self.places[1].push(place[1]);
         }
     }
 
@@ -77,20 +82,33 @@ impl BrokenRow {
         self.older.iter().copied()
     }
 
-    /// Takes the pixels before column `end` off the front of `rest`, which starts as all of them:
-    /// column and place of each.
+    /// The pixels of the block that begins at column `first`, a bit for each. `rest` counts those
+    /// that were taken so far.
     #[inline(always)]
-    pub(super) fn take(
-        &self,
-        rest: &mut usize,
-        end: u32,
-    ) -> impl ExactSizeIterator<Item = (u32, [i32; 2])> {
-        let from = *rest;
-        let pixels = &self.pixels[from..];
-        let count = pixels.iter().take_while(|[column, _]| u32::from(*column) < end).count();
-        *rest += count;
-        let places = &self.places[from..*rest];
-        pixels[..count].iter().zip(places).map(|([column, _], place)| (u32::from(*column), *place))
+    pub(super) fn take(&self, rest: &mut usize, first: u32) -> u64 {
+        let mut taken = 0;
+        for [column, _] in &self.pixels[*rest..] {
+            let i = u32::from(*column) - first;
+            if i >= u64::BITS {
+                break;
+            }
+            taken |= 1 << i;
+            *rest += 1;
+        }
+        taken
+    }
+
+    /// Reads them all, into their columns of `row`.
+    #[inline(always)]
+    pub(super) fn read<T: Texel>(&self, color: &Plane<T>, valid: Rect, row: &mut [T]) {
+        let [xs, ys] = self.places.each_ref().map(|places| places.chunks(BLOCK));
+        for (pixels, (xs, ys)) in self.pixels.chunks(BLOCK).zip(xs.zip(ys)) {
+            let mut texels = [T::default(); BLOCK];
+            T::sample_each(color, valid, &Listed { xs, ys }, &mut texels[..xs.len()]);
+            for ([column, _], texel) in pixels.iter().zip(texels) {
+                row[usize::from(*column)] = texel;
+            }
+        }
     }
 }
 

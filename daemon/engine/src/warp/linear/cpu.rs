@@ -14,7 +14,7 @@ use crate::key::{KeyFrame, Velocity};
 use crate::phase::Phase;
 use crate::plane::{Plane, Rect};
 use crate::warp::for_each_valid_row;
-use crate::warp::sample::{Listed, sample, sample_run};
+use crate::warp::sample::{Listed, Positions as _, sample, sample_run};
 
 /// Warps `key` to `phase` into `out`, which has the key's size and format. `past` are the keys before
 /// it, from the newest on, `map` is the map of the key's field grid; `scratch` has taken the key.
@@ -117,8 +117,8 @@ fn gather<T: Texel>(
     );
 }
 
-/// Pixels that are read together.
-const BLOCK: usize = 64;
+/// Pixels that are read together, a bit for each.
+pub(super) const BLOCK: usize = u64::BITS as usize;
 
 /// What a row of pixels needs, kept from row to row.
 #[derive(Debug, Default)]
@@ -147,44 +147,43 @@ fn gather_row<T: Texel>(
     let mut rest = 0;
     for (block, texels) in (0..).zip(row.chunks_mut(BLOCK)) {
         let first = block * BLOCK as u32;
-        let broken = scratch.broken.take(&mut rest, first + texels.len() as u32);
+        let broken = scratch.broken.take(&mut rest, first);
         gather_block(frame, color, &scratch.cells, broken, [first, index_y], texels);
     }
+    scratch.broken.read(color, frame.valid, row);
     for (column, key, [x, y]) in scratch.broken.older() {
         row[column as usize] = sample(older[usize::from(key)], frame.valid, x, y);
     }
     ROW.set(scratch);
 }
 
-/// The pixels from `index` of the valid rectangle on, at most [`BLOCK`]. `broken` are those among
-/// them that lie in broken cells: column, and where they are read.
+/// The pixels from `index` of the valid rectangle on, at most [`BLOCK`]: anything where a bit of
+/// `broken` says that they lie in broken cells.
 #[inline(always)]
 fn gather_block<T: Texel>(
     frame: &Frame<'_>,
     color: &Plane<T>,
     cells: &RowCells,
-    broken: impl ExactSizeIterator<Item = (u32, [i32; 2])>,
+    broken: u64,
     index: [u32; 2],
     texels: &mut [T],
 ) {
-    let positions = cells.positions(frame, index, texels.len());
-    if broken.len() == 0 && !cells.is_finer {
-        if let Some([dx, dy]) = cells.shared(frame, index[0], texels.len()) {
-            let [p_x, p_y] = frame.centre(index);
-            sample_run(color, frame.valid, [p_x - dx, p_y - dy], texels);
-        } else {
-            T::sample_each(color, frame.valid, &positions, texels);
+    let positions = cells.positions(frame, index, texels.len(), broken);
+    if cells.is_finer {
+        let (mut xs, mut ys) = ([0; BLOCK], [0; BLOCK]);
+        let (xs, ys) = (&mut xs[..texels.len()], &mut ys[..texels.len()]);
+        for (i, (x, y)) in xs.iter_mut().zip(ys.iter_mut()).enumerate() {
+            [*x, *y] = positions.at(i);
         }
-        return;
+        return T::sample_each(color, frame.valid, &Listed { xs, ys }, texels);
     }
-    let (mut xs, mut ys) = ([0; BLOCK], [0; BLOCK]);
-    let (xs, ys) = (&mut xs[..texels.len()], &mut ys[..texels.len()]);
-    positions.list(xs, ys);
-    for (column, place) in broken {
-        let i = (column - index[0]) as usize;
-        [xs[i], ys[i]] = place;
+    let shared = if broken == 0 { cells.shared(frame, index[0], texels.len()) } else { None };
+    if let Some([dx, dy]) = shared {
+        let [p_x, p_y] = frame.centre(index);
+        sample_run(color, frame.valid, [p_x - dx, p_y - dy], texels);
+    } else {
+        T::sample_each(color, frame.valid, &positions, texels);
     }
-    T::sample_each(color, frame.valid, &Listed { xs, ys }, texels);
 }
 
 impl<'a> Frame<'a> {

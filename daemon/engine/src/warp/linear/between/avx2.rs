@@ -100,23 +100,6 @@ pub(super) fn positions(row: &RowPositions<'_>, i: usize) -> [__m256i; 2] {
     ]
 }
 
-/// Where the pixels are read, into `xs` and `ys`, as many as whole steps hold; returns their
-/// number.
-#[inline]
-#[target_feature(enable = "avx2")]
-pub(super) fn list(row: &RowPositions<'_>, xs: &mut [i32], ys: &mut [i32]) -> usize {
-    let (xs, ys) = (xs.as_chunks_mut::<LANES>().0, ys.as_chunks_mut::<LANES>().0);
-    for (i, (eight_xs, eight_ys)) in xs.iter_mut().zip(ys).enumerate() {
-        let [x, y] = positions(row, i * LANES);
-        // SAFETY: both hold 8 values of 32 bits, and the stores need no alignment.
-        unsafe {
-            _mm256_storeu_si256(eight_xs.as_mut_ptr().cast(), x);
-            _mm256_storeu_si256(eight_ys.as_mut_ptr().cast(), y);
-        }
-    }
-    xs.len() * LANES
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -144,7 +127,7 @@ mod tests {
                 [cell as u16, (hash(case, i as u32, 3) & 0xff) as u16]
             });
             let row =
-                RowPositions { xs: &xs, ys: &ys, places: &places, p: [700, -30], is_finer: false };
+                RowPositions { xs: &xs, ys: &ys, places: &places, p: [700, -30], wanted: u64::MAX };
             for i in 0..=PIXELS - LANES {
                 // SAFETY: the processor has AVX2, asked for above.
                 let together = unsafe { positions(&row, i) };

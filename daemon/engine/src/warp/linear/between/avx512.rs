@@ -6,7 +6,7 @@
 use std::arch::x86_64::{
     __m512i, _mm512_add_epi32, _mm512_and_si512, _mm512_loadu_si512, _mm512_madd_epi16,
     _mm512_permutexvar_epi32, _mm512_set1_epi32, _mm512_setr_epi32, _mm512_srai_epi32,
-    _mm512_srli_epi32, _mm512_storeu_si512, _mm512_sub_epi32,
+    _mm512_srli_epi32, _mm512_sub_epi32,
 };
 
 use super::{LANES, RowPositions};
@@ -64,23 +64,6 @@ pub(super) fn positions(row: &RowPositions<'_>, i: usize) -> [__m512i; 2] {
     ]
 }
 
-/// Where the pixels are read, into `xs` and `ys`, as many as whole steps hold; returns their
-/// number.
-#[inline]
-#[target_feature(enable = "avx512f,avx512bw")]
-pub(super) fn list(row: &RowPositions<'_>, xs: &mut [i32], ys: &mut [i32]) -> usize {
-    let (xs, ys) = (xs.as_chunks_mut::<LANES>().0, ys.as_chunks_mut::<LANES>().0);
-    for (i, (sixteen_xs, sixteen_ys)) in xs.iter_mut().zip(ys).enumerate() {
-        let [x, y] = positions(row, i * LANES);
-        // SAFETY: both hold 16 values of 32 bits, and the stores need no alignment.
-        unsafe {
-            _mm512_storeu_si512(sixteen_xs.as_mut_ptr().cast(), x);
-            _mm512_storeu_si512(sixteen_ys.as_mut_ptr().cast(), y);
-        }
-    }
-    xs.len() * LANES
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -110,7 +93,7 @@ mod tests {
                 [cell as u16, (hash(case, i as u32, 3) & 0xff) as u16]
             });
             let row =
-                RowPositions { xs: &xs, ys: &ys, places: &places, p: [700, -30], is_finer: false };
+                RowPositions { xs: &xs, ys: &ys, places: &places, p: [700, -30], wanted: u64::MAX };
             for i in 0..=PIXELS - LANES {
                 // SAFETY: the processor has AVX-512, asked for above.
                 let together = unsafe { positions(&row, i) };

@@ -55,7 +55,7 @@ pub(super) fn places(
     frame: &Frame<'_>,
     index_y: u32,
     pixels: &[[u16; 2]],
-    places: &mut Vec<[i32; 2]>,
+    [place_xs, place_ys]: &mut [Vec<i32>; 2],
     older: &mut Vec<OlderPixel>,
 ) {
     let mut holes = Holes::new(frame, index_y);
@@ -71,7 +71,9 @@ pub(super) fn places(
             // SAFETY: both members are 32 bytes that any value may have.
             let (place, found) =
                 unsafe { ([xs.lanes[i], ys.lanes[i]], found.lanes[i].cast_unsigned()) };
-            places.push(if found == u32::MAX { holes.place(*pixel, older) } else { place });
+            let place = if found == u32::MAX { holes.place(*pixel, older) } else { place };
+            place_xs.push(place[0]);
+            place_ys.push(place[1]);
         }
     }
 }
