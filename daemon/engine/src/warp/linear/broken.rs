@@ -151,16 +151,12 @@ impl<'a> Holes<'a> {
             }
         };
         self.last = Some((cell, far));
-        let (frame, cell_y, way) = (self.frame, self.cell_y, &mut self.way);
-        let way = |far: &FarSurface| {
-            *way.get_or_insert_with(|| frame.memory.way(frame, far, [u32::from(cell), cell_y]))
-        };
-        let p = self.frame.centre([u32::from(column), self.index_y]);
-        match hole_place(frame, far, way, p) {
+        let (cell, p) = ([u32::from(cell), self.cell_y], [u32::from(column), self.index_y]);
+        match hole_place(self.frame, far, cell, &mut self.way, self.frame.centre(p)) {
             HolePlace::Key(place) => place,
             HolePlace::Older(key, place) => {
                 older.push((column, key, place));
-                p
+                place
             }
         }
     }

@@ -28,11 +28,13 @@ pub(super) fn far_surface(frame: &Frame<'_>, cell: [u32; 2]) -> Option<FarSurfac
     })
 }
 
-/// Where pixel centre `p` of a hole is read; `way` says where its far surface was.
+/// Where pixel centre `p` of a hole in `cell` is read, which continues `far`. `way` keeps for the
+/// others of the cell where that was in the keys before.
 pub(super) fn hole_place(
     frame: &Frame<'_>,
     far: Option<FarSurface>,
-    way: impl FnOnce(&FarSurface) -> Way,
+    cell: [u32; 2],
+    way: &mut Option<Way>,
     p: [i32; 2],
 ) -> HolePlace {
     let Some(far) = far else { return HolePlace::Key(p) };
@@ -43,7 +45,8 @@ pub(super) fn hole_place(
         return HolePlace::Key(far_place(frame, q, far.depth));
     }
     // (4)
-    let seen = frame.memory.place(frame, &way(&far), [p[0] - dx, p[1] - dy]);
+    let way = way.get_or_insert_with(|| Way::new(frame, &far, cell));
+    let seen = frame.memory.place(frame, way, [p[0] - dx, p[1] - dy]);
     if let Some((key, place)) = seen {
         return HolePlace::Older(key, place);
     }

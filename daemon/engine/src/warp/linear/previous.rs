@@ -7,8 +7,8 @@
 //! (a) D_1 = how far f came to the newest key
 //! (b) D_k = D_(k-1) + how far the surface came to key k - 1 that this shows where f was, or, as
 //!           what made the hole may have hidden it there, as close to that as possible on the side
-//!           away from the hole, within 32 cells and within 1/32 of the depth of f; none where that
-//!           differs from D_1 by more than half a pixel
+//!           away from the hole, within 16 cells and within 1/32 of the depth of f; none where
+//!           something farther comes first, or that differs from D_1 by more than half a pixel
 //! (c) the hole shows key k at q - D_k if that shows there the depth of f as key k - 1 has it, to
 //!     1/32, and every key after k something nearer
 //! ```
@@ -31,7 +31,7 @@ pub const DEPTH_SHIFT: u32 = 5;
 pub const MOST_KEYS: usize = 4;
 
 /// Cells that (b) goes to find the surface in sight.
-pub const REACH: i32 = 32;
+pub const REACH: i32 = 16;
 
 /// How far a surface's motion over one interval may differ from that over the newest, 1/32 pixel.
 pub const STEADY: u16 = 16;
@@ -67,12 +67,19 @@ pub(super) struct Memory<'a> {
     keys: [Option<Kept<'a>>; MOST_KEYS],
 }
 
-/// Where a far surface was in the keys before.
-#[derive(Clone, Copy, Debug, Default)]
+/// Where a far surface was in the keys before, as far back as holes have asked.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Way {
-    /// By key: how far it came since, 1/32 pixel, and its depth key.
+    /// The source that the surface shows in the newest key, and its centre.
+    source: usize,
+    from: [i32; 2],
+    /// The step away from the hole, (b).
+    away: [i32; 2],
+    /// By key: how far it came since, Q8 pixels, and its depth key.
     steps: [([i32; 2], u32); MOST_KEYS],
     count: usize,
+    /// Whether it was not found further back.
+    is_over: bool,
 }
 
 /// Whether holes after `key` may show what `older`, the key before it, shows: its motion points
@@ -119,41 +126,43 @@ impl<'a> Memory<'a> {
         memory
     }
 
-    /// (a) and (b): where the surface `far` of the holes in `cell` was.
-    pub(super) fn way(&self, frame: &Frame<'_>, far: &FarSurface, cell: [u32; 2]) -> Way {
-        let mut way = Way::default();
-        let Some(first) = &self.keys[0] else { return way };
-        let width = frame.map.x.cells();
-        let centre = |[x, y]: [u32; 2]| [frame.map.x.centre(x), frame.map.y.centre(y)];
-        let from = centre([far.source % width, far.source / width]);
-        let step = away(centre(cell), centre([far.cell % width, far.cell / width]), frame.one_cell);
-        let mut total = [0; 2];
-        let mut depth = far.depth;
-        let mut came = first.came.data()[far.source as usize];
-        for (index, kept) in self.keys.iter().enumerate() {
-            if !came.is_trackable() || kept.is_none() {
-                break;
-            }
-            // 1/32 pixels in Q8.
-            total = [total[0] + (i32::from(came.x) << 3), total[1] + (i32::from(came.y) << 3)];
-            way.steps[index] = (total, depth);
-            way.count = index + 1;
-            let (Some(kept), Some(Some(next))) = (kept, self.keys.get(index + 1)) else { break };
-            let start = [from[0] - total[0], from[1] - total[1]];
-            let seen = |i: i32| {
-                let at = [start[0] + i * step[0], start[1] + i * step[1]];
-                cell_at(frame, at).filter(|cell| is_same(kept.depth.data()[*cell], depth))
-            };
-            // The cell beside something nearer has that one's motion: it is dilated.
-            let seen = (0..=REACH).find_map(|i| seen(i - 1).and(seen(i)));
-            let Some(seen) = seen else { break };
-            depth = kept.depth.data()[seen];
-            came = next.came.data()[seen];
-            if !is_steady(first.came.data()[far.source as usize], came) {
-                break;
-            }
+    /// Adds to `way` where its surface was one key further back, (a) and (b); false if it is not
+    /// known.
+    fn step_back(&self, frame: &Frame<'_>, way: &mut Way) -> bool {
+        if way.is_over {
+            return false;
         }
-        way
+        let found = self.earlier(frame, way);
+        match found {
+            Some(step) => {
+                way.steps[way.count] = step;
+                way.count += 1;
+            }
+            None => way.is_over = true,
+        }
+        found.is_some()
+    }
+
+    fn earlier(&self, frame: &Frame<'_>, way: &Way) -> Option<([i32; 2], u32)> {
+        let kept = self.keys.get(way.count).copied().flatten()?;
+        let first = self.keys[0]?.came.data()[way.source];
+        let (total, depth, came) = match way.count.checked_sub(1) {
+            None => ([0; 2], frame.field.source.depth.data()[way.source], first),
+            Some(newer) => {
+                let (total, depth) = way.steps[newer];
+                let newer = self.keys[newer]?.depth;
+                let start = [way.from[0] - total[0], way.from[1] - total[1]];
+                let seen = in_sight(frame, newer, depth, start, way.away)?;
+                let came = kept.came.data()[seen];
+                if !is_steady(first, came) {
+                    return None;
+                }
+                (total, newer.data()[seen], came)
+            }
+        };
+        // 1/32 pixels in Q8.
+        let further = [total[0] + (i32::from(came.x) << 3), total[1] + (i32::from(came.y) << 3)];
+        came.is_trackable().then_some((further, depth))
     }
 
     /// (c): the key, counted from 0, and the place in it, Q8 pixels, that shows what the surface of
@@ -161,11 +170,15 @@ impl<'a> Memory<'a> {
     pub(super) fn place(
         &self,
         frame: &Frame<'_>,
-        way: &Way,
+        way: &mut Way,
         q: [i32; 2],
     ) -> Option<(u8, [i32; 2])> {
-        let steps = (0..).zip(&way.steps[..way.count]).zip(self.keys.iter().flatten());
-        for ((index, &(total, depth)), kept) in steps {
+        for (index, kept) in (0..).zip(self.keys.iter().flatten()) {
+            // Most holes end with the first key: the way goes on for those that do not.
+            if way.count <= usize::from(index) && !self.step_back(frame, way) {
+                return None;
+            }
+            let (total, depth) = way.steps[usize::from(index)];
             let q = [q[0] - total[0], q[1] - total[1]];
             let seen = kept.depth.data()[cell_at(frame, q)?];
             if !is_same(seen, depth) {
@@ -183,11 +196,55 @@ impl<'a> Memory<'a> {
     }
 }
 
+impl Way {
+    /// Of the surface `far` that the holes in `cell` continue.
+    pub(super) fn new(frame: &Frame<'_>, far: &FarSurface, cell: [u32; 2]) -> Self {
+        let width = frame.map.x.cells();
+        let centre = |[x, y]: [u32; 2]| [frame.map.x.centre(x), frame.map.y.centre(y)];
+        let shown = centre([far.cell % width, far.cell / width]);
+        Self {
+            source: far.source as usize,
+            from: centre([far.source % width, far.source / width]),
+            away: away(centre(cell), shown, frame.one_cell),
+            steps: Default::default(),
+            count: 0,
+            is_over: false,
+        }
+    }
+}
+
 impl Kept<'_> {
     /// Whether it shows a surface of depth key `depth` at the pixel nearest to `q`.
     fn shows(&self, frame: &Frame<'_>, q: [i32; 2], depth: u32) -> bool {
         cell_at(frame, q).is_some_and(|cell| is_same(self.depth.data()[cell], depth))
     }
+}
+
+/// The cell, from `start` on by steps of `away`, where `depths` show a surface of depth key `depth`,
+/// and did a step before: the cell beside something nearer has that one's motion, as it is dilated.
+/// None where what is farther, or the border, comes first.
+fn in_sight(
+    frame: &Frame<'_>,
+    depths: &Plane<u32>,
+    depth: u32,
+    start: [i32; 2],
+    away: [i32; 2],
+) -> Option<usize> {
+    let depths = depths.data();
+    let at = |i: i32| cell_at(frame, [start[0] + i * away[0], start[1] + i * away[1]]);
+    let mut was_same = at(-1).is_some_and(|cell| is_same(depths[cell], depth));
+    for i in 0..=REACH {
+        let cell = at(i)?;
+        let is_its = is_same(depths[cell], depth);
+        if is_its && was_same {
+            return Some(cell);
+        }
+        if !is_its && depths[cell] < depth {
+            return None;
+        }
+        was_same = is_its;
+    }
+    None
 }
 
 /// The cell that holds the pixel nearest to `q`; None outside.

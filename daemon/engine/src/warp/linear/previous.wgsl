@@ -7,7 +7,7 @@
 
 const DEPTH_SHIFT: u32 = 5u;
 const MOST_KEYS: u32 = 4u;
-const REACH: i32 = 32;
+const REACH: i32 = 16;
 const STEADY: i32 = 16;
 
 // An invocation for each cell.
@@ -70,17 +70,7 @@ fn way_of(cell: vec2<u32>, far: u32) -> Way {
         if key == LEVEL {
             break;
         }
-        // The cell beside something nearer has that one's motion: it is dilated.
-        var before = seen_at(key, from_centre - total - step, depth);
-        var seen = NO_CELL;
-        for (var i = 0; i <= REACH; i++) {
-            let here = seen_at(key, from_centre - total + i * step, depth);
-            if before != NO_CELL && here != NO_CELL {
-                seen = here;
-                break;
-            }
-            before = here;
-        }
+        let seen = in_sight(key, depth, from_centre - total, step);
         if seen == NO_CELL {
             break;
         }
@@ -94,13 +84,27 @@ fn way_of(cell: vec2<u32>, far: u32) -> Way {
     return way;
 }
 
-// The cell at `q` in a key if that shows a surface of depth key `depth` there, else `NO_CELL`.
-fn seen_at(key: u32, q: vec2<i32>, depth: u32) -> u32 {
-    let cell = cell_at(q);
-    if cell == NO_CELL || !is_same(depth_in(key, cell), depth) {
-        return NO_CELL;
+// The cell, from `start` on by steps of `step`, where a key shows a surface of depth key `depth`,
+// and did a step before, `NO_CELL` where what is farther, or the border, comes first.
+fn in_sight(key: u32, depth: u32, start: vec2<i32>, step: vec2<i32>) -> u32 {
+    let before = cell_at(start - step);
+    var was_same = before != NO_CELL && is_same(depth_in(key, before), depth);
+    for (var i = 0; i <= REACH; i++) {
+        let cell = cell_at(start + i * step);
+        if cell == NO_CELL {
+            return NO_CELL;
+        }
+        let here = depth_in(key, cell);
+        let is_its = is_same(here, depth);
+        if is_its && was_same {
+            return cell;
+        }
+        if !is_its && here < depth {
+            return NO_CELL;
+        }
+        was_same = is_its;
     }
-    return cell;
+    return NO_CELL;
 }
 
 // A cell's step on beyond the far side, along the axis in which that lies farther apart from the
