@@ -1,7 +1,8 @@
 //! Runs the steps in order: a key frame in, in-between frames out.
 //!
 //! One [`Engine`] serves one stream. It keeps the newest keys and reuses its buffers: once every
-//! buffer has its size, neither a key nor a frame allocates pixels.
+//! buffer has its size, neither a key nor a frame allocates pixels, but the few keys after a cut and
+//! after a key without depth or motion, which lets go of all that was remembered.
 
 use std::num::NonZeroUsize;
 use std::sync::Arc;
@@ -306,6 +307,7 @@ impl Engine {
             let oldest = self.previous.as_ref().filter(is_known);
             let flow = Some(&mut self.scratch.flow).filter(|_| !is_estimated);
             ladder.take_key(&self.pool, flow, &mut key, older, oldest);
+            key.is_found_cut = ladder.evidence().is_cut();
         }
         if !key.velocity.data().is_empty() {
             let cells = [key.velocity.width(), key.velocity.height()];
@@ -342,7 +344,7 @@ impl Engine {
             return Some(key);
         }
         self.remembered.insert(0, key);
-        let most = kept_keys(cells) - 1;
+        let most = kept_keys(cells).saturating_sub(1);
         let last = self.remembered.get(most).is_some().then(|| self.remembered.swap_remove(most));
         self.remembered.truncate(most);
         last

@@ -161,6 +161,8 @@ pub struct KeyFrame {
     pub motion_from: Option<MonoTime>,
     /// Nothing before this key relates to it.
     pub is_cut: bool,
+    /// The same, as its picture has shown ([`crate::evidence`]), although nobody declared it.
+    pub is_found_cut: bool,
     /// Colour, at the size of the output.
     pub color: ColorPlane,
     /// What is compared with the keys before and after where `color` alternates with them

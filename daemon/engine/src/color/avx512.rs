@@ -79,7 +79,8 @@ struct Corners {
 /// hold; returns their number.
 ///
 /// # Panics
-/// If `valid` does not lie inside the plane, or the plane has 2^31 pixels or more.
+/// If `valid` does not lie inside the plane, or the plane has 2^31 pixels or more, or 2^23 along
+/// an axis.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512vnni")]
 pub(super) fn sample_each(
@@ -90,6 +91,7 @@ pub(super) fn sample_each(
 ) -> usize {
     assert!(valid.fits(plane.width(), plane.height()), "the valid rectangle lies inside the plane");
     assert!(i32::try_from(plane.data().len()).is_ok(), "every pixel has a 32-bit index");
+    assert!(plane.width().max(plane.height()) < 1 << 23, "every place has 32 bits in Q8");
     let axes = [Axis::new(valid.x, valid.width), Axis::new(valid.y, valid.height)];
     let (sixteens, _) = out.as_chunks_mut::<LANES>();
     for (i, out) in sixteens.iter_mut().enumerate() {

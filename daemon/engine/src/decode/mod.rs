@@ -146,6 +146,7 @@ pub fn decode_key(
     key.index = input.index;
     key.content_time = input.content_time;
     key.is_cut = input.is_cut;
+    key.is_found_cut = false;
     key.camera = input.camera;
     key.motion_from_camera = input.motion_from_camera;
     key.acceleration.resize(0, 0);

@@ -262,7 +262,9 @@ fn a_cut_between_two_places_in_which_nothing_moves_is_noticed() {
         .map(|(at_ms, seed)| {
             push_place(&mut engine, at_ms, seed, 0, 0.0);
             let (_, _, evidence) = engine.newest_seen().unwrap();
-            evidence.unwrap().is_cut()
+            let is_cut = evidence.unwrap().is_cut();
+            assert_eq!(engine.newest.as_ref().unwrap().is_found_cut, is_cut, "nothing crosses it");
+            is_cut
         })
         .collect();
     assert_eq!(is_cut, [false, false, false, true, false]);

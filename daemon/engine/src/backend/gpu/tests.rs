@@ -124,7 +124,8 @@ fn assert_same(gpu: &Arc<Gpu>, method: Method, key: &KeyFrame, what: &str) {
 fn every_adapter_fills_holes_from_the_keys_before_as_the_cpu_does() {
     let cases = [([64, 40], [64, 40], 6), ([213, 120], [142, 80], 20), ([213, 120], [54, 30], 40)];
     for gpu in test_gpus("every_adapter_fills_holes_from_the_keys_before_as_the_cpu_does") {
-        for ((seed, (size, cells, reach)), format) in (0..).zip(cases).zip(FORMATS) {
+        let cases = cases.into_iter().flat_map(|case| FORMATS.map(|format| (case, format)));
+        for (seed, ((size, cells, reach), format)) in (0..).zip(cases) {
             // One place, before which something nearer comes and goes; it hardly moves.
             let came = |age: u32| {
                 let step = |x: u32, salt: u32| (hash(x / 9, salt, age) % 5) as i16 - 2;

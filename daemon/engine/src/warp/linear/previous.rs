@@ -39,17 +39,12 @@ pub const STEADY: u16 = 16;
 /// Bytes that a device may be asked to hold of the fields of all keys, at 8 bytes a cell.
 const MOST_BYTES: usize = 1 << 27;
 
-/// How many keys before the newest holes may show, on a field of so many cells.
+/// How many keys before the newest holes may show, on a field of so many cells: none where two
+/// fields would not fit (more than 8 388 608 cells).
 #[must_use]
 pub const fn kept_keys(cells: usize) -> usize {
     let held = MOST_BYTES / (8 * if cells == 0 { 1 } else { cells });
-    if held > MOST_KEYS {
-        MOST_KEYS
-    } else if held < 2 {
-        1
-    } else {
-        held - 1
-    }
+    if held > MOST_KEYS { MOST_KEYS } else { held.saturating_sub(1) }
 }
 
 /// What holes read of one key before the newest, beside its colour.
@@ -83,14 +78,15 @@ pub(super) struct Way {
 }
 
 /// Whether holes after `key` may show what `older`, the key before it, shows: its motion points
-/// back to it, and both have depth, motion and one geometry.
+/// back to it, no cut lies between them, and both have depth, motion and one geometry.
 #[must_use]
 fn has_previous(key: &KeyFrame, older: &KeyFrame) -> bool {
     let size = |key: &KeyFrame| {
         let (color, depth) = (&key.color, &key.depth);
         [color.width(), color.height(), depth.width(), depth.height()]
     };
-    key.motion_from == Some(older.content_time)
+    !key.is_found_cut
+        && key.motion_from == Some(older.content_time)
         && older.motion_from.is_some()
         && !key.depth.data().is_empty()
         && !key.velocity.data().is_empty()

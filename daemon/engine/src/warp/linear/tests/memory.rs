@@ -84,6 +84,9 @@ fn a_key_that_nothing_leads_to_is_not_shown() {
     // Its successor does not point to it, as after a cut or a lost key.
     assert_eq!(change(2, |key| key.motion_from = None), 0);
     assert_eq!(change(1, |key| key.motion_from = Some(MonoTime::ZERO)), 0);
+    // It is a cut, as its picture showed: what was before it is of another place.
+    assert_eq!(change(2, |key| key.is_found_cut = true), PART);
+    assert_eq!(change(1, |key| key.is_found_cut = true), 0);
     // The picture had another size.
     assert_eq!(change(2, |key| key.valid.width -= 1), 0);
     // The wall was somewhere else, or went another way.
@@ -109,9 +112,9 @@ fn a_key_that_saw_something_farther_there_ends_the_memory() {
 fn fewer_keys_are_kept_of_fields_that_would_not_fit_a_device() {
     use crate::warp::linear::{MOST_KEYS, kept_keys};
     assert_eq!([1, 960 * 540, 1920 * 1080, 2048 * 1080].map(kept_keys), [MOST_KEYS; 4]);
-    assert_eq!([3840 * 2160, 8192 * 4320].map(kept_keys), [1, 1]);
-    for cells in [1, 1_000_000, 4_000_000, 5_000_000, 8_000_000] {
+    assert_eq!([3840 * 2160, 4096 * 2160, 8192 * 4320].map(kept_keys), [1, 0, 0]);
+    for cells in [1, 1_000_000, 4_000_000, 5_000_000, 8_000_000, 8_847_360] {
         let kept = kept_keys(cells);
-        assert!(kept == 1 || (kept + 1) * 8 * cells <= 1 << 27, "{cells}");
+        assert!(kept == 0 || (kept + 1) * 8 * cells <= 1 << 27, "{cells}");
     }
 }
