@@ -1,5 +1,6 @@
 //! What stands in for the GPU backend in a build without the feature `gpu`: there are no adapters,
-//! so none is ever opened. What uses the backend reads the same either way.
+//! so none is ever opened. What uses the backend in this crate reads the same either way; who
+//! draws with an adapter, as windows do, needs the feature.
 
 #[path = "gpu/error.rs"]
 mod error;
