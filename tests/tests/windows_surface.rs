@@ -74,6 +74,9 @@ fn a_surface_keeps_the_shape_of_the_picture_in_a_window_of_any_size_and_scale() 
     };
     stage.compositor.order(Order::Resize([300, 300]));
     stage.show_until_seen(|seen| is_so(seen, [300, 300], [64, 64]));
+    // With bars alone it would be 64x2400.
+    stage.compositor.order(Order::Resize([16, 600]));
+    stage.show_until_seen(|seen| is_so(seen, [16, 600], [16, 600]));
     stage.compositor.order(Order::Scale(2));
     stage.compositor.order(Order::Resize([400, 100]));
     stage.show_until_seen(|seen| is_so(seen, [400, 100], [128, 32]));

@@ -586,7 +586,8 @@ fn ask_for_real_time() {
     });
 }
 
-/// Asks the same for a worker of the engine, one below the thread that waits for it.
+/// Asks the same for a thread that a stream waits for or hands its pictures to, as the engine's
+/// workers and the threads of surfaces: one below the stream's own.
 pub fn ask_for_real_time_work() {
     if let Err(error) = set_real_time(REAL_TIME_PRIORITY - 1) {
         debug!(%error, "a worker runs without real-time priority");

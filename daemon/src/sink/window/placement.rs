@@ -3,7 +3,9 @@
 use foreframe_engine::Rect;
 
 /// A buffer has at most so many columns and rows: no display has more, and 32 bits hold its bytes.
-const MOST: u32 = 16_384;
+pub(super) const MOST: u32 = 16_384;
+/// Times the pixels of picture or window, whichever has more, that bars may bring a buffer to.
+const WASTE: u64 = 4;
 
 /// Size of a buffer, and the part of it that shows the picture. The rest is black.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -15,6 +17,29 @@ pub(super) struct Placement {
 }
 
 impl Placement {
+    /// For a display that stretches buffers to the window, in images of at most `most` columns and
+    /// rows: padded, or where bars make that too large, scaled to the window.
+    pub(super) fn stretched(picture: [u32; 2], window: [u32; 2], most: u32) -> Self {
+        let padded = Self::padded(picture, window);
+        let pixels = |[width, height]: [u32; 2]| u64::from(width) * u64::from(height);
+        let enough = pixels(picture).max(pixels(window)).saturating_mul(WASTE);
+        match padded.buffer.iter().all(|&length| length <= most) && pixels(padded.buffer) <= enough
+        {
+            true => padded,
+            false => Self::limited(picture, window, most),
+        }
+    }
+
+    /// Scaled to the window, or to one of its shape that images of at most `most` columns and rows
+    /// can fill.
+    pub(super) fn limited(picture: [u32; 2], window: [u32; 2], most: u32) -> Self {
+        let longest = window[0].max(window[1]);
+        match longest > most {
+            true => Self::scaled(picture, window.map(|length| rounded(length, most, longest))),
+            false => Self::scaled(picture, window),
+        }
+    }
+
     /// For a display that stretches buffers to the window: the picture pixel by pixel, with bars
     /// that give the buffer the window's shape.
     pub(super) fn padded(picture: [u32; 2], window: [u32; 2]) -> Self {
@@ -86,7 +111,43 @@ mod tests {
         assert_eq!(wide.picture, Rect { x: 100, y: 0, width: 100, height: 100 });
     }
 
+    #[test]
+    fn a_window_of_another_shape_does_not_make_images_huge() {
+        let picture = [1920, 1080];
+        assert_eq!(Placement::padded(picture, [200, 1400]).buffer, [1920, 13_440]);
+        let narrow = Placement::stretched(picture, [200, 1400], MOST);
+        assert_eq!(narrow, Placement::scaled(picture, [200, 1400]));
+        // Bars of an ordinary window stay bars.
+        let square = Placement::stretched(picture, [800, 800], MOST);
+        assert_eq!(square, Placement::padded(picture, [800, 800]));
+        // Larger than the device has images.
+        let wall = Placement::stretched([7680, 4320], [10_240, 4320], 8192);
+        assert_eq!(wall, Placement::scaled([7680, 4320], [8192, 3456]));
+    }
+
     proptest! {
+        #[test]
+        fn images_have_the_shape_of_the_window_and_are_within_the_limits(
+            picture in [1_u32..5_000, 1_u32..5_000],
+            window in [1_u32..9_000, 1_u32..9_000],
+            most in 64_u32..9_000,
+        ) {
+            let area = |[width, height]: [u32; 2]| u64::from(width) * u64::from(height);
+            let enough = 4 * area(picture).max(area(window));
+            for placement in [
+                Placement::stretched(picture, window, most),
+                Placement::limited(picture, window, most),
+            ] {
+                let [width, height] = placement.buffer;
+                prop_assert!(width <= most && height <= most, "{placement:?}");
+                prop_assert!(area(placement.buffer) <= enough, "{placement:?}");
+                prop_assert!(placement.picture.fits(width, height), "{placement:?}");
+                let [across, down] = window.map(i64::from);
+                let off = i64::from(width) * down - i64::from(height) * across;
+                prop_assert!(off.abs() <= across.max(down), "{placement:?} in {window:?}");
+            }
+        }
+
         #[test]
         fn the_picture_is_inside_and_keeps_its_shape(
             picture in [1_u32..5_000, 1_u32..5_000],

@@ -2,6 +2,7 @@
 //!
 //! - [`policy`]: which present mode, which format
 //! - [`pass`]: the pass that draws a picture on a surface, with its shader
+//! - [`patience`]: how long something may fail before more is done about it
 //! - [`output`]: one surface, and what it takes to present on it
 //!
 //! A driver may wait for the display in the middle of any call, so a surface has a thread of its
@@ -11,6 +12,7 @@
 
 mod output;
 mod pass;
+mod patience;
 mod policy;
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
@@ -49,10 +51,14 @@ pub(super) enum Canvas {
 #[derive(Clone, Debug, thiserror::Error)]
 pub(super) enum SurfaceError {
     /// There is no device to draw on it.
-    #[error("the CPU makes the pictures")]
+    #[error(
+        "expected a GPU adapter that makes the pictures, found the CPU; choose an adapter with --backend"
+    )]
     NoGpu,
     /// The adapter has no way to this display.
-    #[error("{0} cannot present to this display")]
+    #[error(
+        "expected an adapter that presents to this display, found {0}; choose one that does with --backend gpu:NAME"
+    )]
     CannotPresent(String),
     /// All that is offered shows parts of two frames at once.
     #[error("expected mailbox or fifo among the present modes, found {0}")]
@@ -64,10 +70,12 @@ pub(super) enum SurfaceError {
     #[error("the driver makes no surface: {0}")]
     Refused(String),
     /// Another device makes the pictures than draws them.
-    #[error("the pictures are on another device")]
+    #[error(
+        "expected pictures of the device that draws the window, found those of another; open the stream again"
+    )]
     OtherDevice,
     /// It does not come back as it was.
-    #[error("the surface was lost")]
+    #[error("expected an image of the surface, found that it was lost; open the stream again")]
     Lost,
     /// The device does not work, or no longer.
     #[error(transparent)]

@@ -3,21 +3,28 @@
 use std::sync::{Arc, PoisonError};
 
 use foreframe_engine::backend::gpu::{Gpu, GpuError};
-use foreframe_engine::{MonoTime, StreamFormat};
+use foreframe_engine::{MonoSpan, MonoTime, StreamFormat};
 use tracing::{debug, info};
 use wgpu::{CompositeAlphaMode, CurrentSurfaceTexture, PresentMode, SurfaceTexture};
 
 use super::pass::{Pass, Picture};
+use super::patience::Patience;
 use super::policy::{SurfaceFormat, Waits, present_mode, surface_format};
 use super::{Canvas, SurfaceError};
+use crate::clock;
 use crate::sink::window::placement::Placement;
 use crate::sink::window::shared::Shared;
 use crate::sink::window::wayland::Gate;
 
 /// Frames that a surface holds beside the one on display. One, so that none waits behind another.
 const LATENCY: u32 = 1;
-/// Tries to give a surface another size: what the engine submits in the middle of one spoils it.
+/// Tries to give a surface another size for one picture: what the engine submits in the middle of
+/// one spoils it.
 const TRIES: u32 = 5;
+/// Time that a surface may refuse its size, picture after picture, before the CPU draws.
+const REFUSES_FOR: MonoSpan = MonoSpan::from_ms(5000);
+/// Time without word of the compositor before it is asked for once more.
+const SILENT_FOR: MonoSpan = MonoSpan::from_ms(1000);
 
 /// A surface, ready to be drawn on.
 pub(super) struct Output {
@@ -30,7 +37,9 @@ pub(super) struct Output {
     pass: Pass,
     /// Columns and rows that it has.
     size: Option<[u32; 2]>,
+    refuses: Patience,
     gate: Gate,
+    is_silent: Patience,
     shared: Arc<Shared>,
     /// Dropped after what is drawn on it with.
     canvas: Canvas,
@@ -76,7 +85,9 @@ impl Output {
             alpha: alpha.unwrap_or(CompositeAlphaMode::Auto),
             pass,
             size: None,
+            refuses: Patience::new(REFUSES_FOR),
             gate: Gate::open(),
+            is_silent: Patience::new(SILENT_FOR),
             shared,
             canvas,
             gpu,
@@ -105,7 +116,8 @@ impl Output {
             return Err(SurfaceError::OtherDevice);
         }
         let placement = self.place(picture.size());
-        if self.waits == Waits::AtTheGate && !self.gate.is_open() {
+        let is_new = self.size != Some(placement.buffer);
+        if self.waits == Waits::AtTheGate && !is_new && !self.is_asked_for() {
             return Ok(false);
         }
         let Some(texture) = self.acquire(placement.buffer)? else { return Ok(false) };
@@ -126,12 +138,30 @@ impl Output {
         }
     }
 
+    /// Whether the compositor wants a picture. Where it has been silent for long, the request for
+    /// its word may have stayed here, because the driver committed nothing; so that is sent. The
+    /// gate stays shut: where nobody sees the window, a driver would wait for ever behind it.
+    fn is_asked_for(&mut self) -> bool {
+        if self.gate.is_open() {
+            self.is_silent.renew();
+            return true;
+        }
+        if self.is_silent.is_over(clock::now())
+            && let Canvas::Wayland(face) = &self.canvas
+        {
+            self.is_silent.renew();
+            face.lock().unwrap_or_else(PoisonError::into_inner).commit_rest();
+        }
+        false
+    }
+
     fn place(&self, picture: [u32; 2]) -> Placement {
+        let most = self.gpu.device().limits().max_texture_dimension_2d;
         match &self.canvas {
             Canvas::Wayland(face) => {
-                face.lock().unwrap_or_else(PoisonError::into_inner).place(picture)
+                face.lock().unwrap_or_else(PoisonError::into_inner).place(picture, most)
             }
-            Canvas::Other { .. } => Placement::scaled(picture, self.shared.size()),
+            Canvas::Other { .. } => Placement::limited(picture, self.shared.size(), most),
         }
     }
 
@@ -139,8 +169,8 @@ impl Output {
     fn acquire(&mut self, size: [u32; 2]) -> Result<Option<SurfaceTexture>, SurfaceError> {
         // Once as it is, and once with new images.
         for _ in 0..2 {
-            if self.size != Some(size) {
-                self.configure(size)?;
+            if self.size != Some(size) && !self.configure(size)? {
+                return Ok(None);
             }
             let acquired = self.gpu.guard(|| match self.surface.get_current_texture() {
                 CurrentSurfaceTexture::Validation => {
@@ -163,7 +193,8 @@ impl Output {
         Ok(None)
     }
 
-    fn configure(&mut self, size: [u32; 2]) -> Result<(), SurfaceError> {
+    /// False if the surface does not take this size now.
+    fn configure(&mut self, size: [u32; 2]) -> Result<bool, SurfaceError> {
         self.size = None;
         let configuration = wgpu::SurfaceConfiguration {
             usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
@@ -185,14 +216,24 @@ impl Output {
             });
             match configured {
                 Ok(()) => break,
-                Err(GpuError::Refused { why }) if tried < TRIES => {
-                    info!(why, tried, "the surface does not take its size");
+                Err(GpuError::Refused { .. }) if tried < TRIES => {}
+                Err(GpuError::Refused { why }) => {
+                    if self.refuses.is_new() {
+                        info!(why, tried, ?size, "the surface does not take its size");
+                    }
+                    return match self.refuses.is_over(clock::now()) {
+                        true => Err(GpuError::Refused { why }.into()),
+                        false => Ok(false),
+                    };
                 }
                 Err(error) => return Err(error.into()),
             }
         }
         debug!(?size, "surface");
+        self.refuses.renew();
         self.size = Some(size);
-        Ok(())
+        // New images have no frame before them that a driver could wait for.
+        self.gate.reopen();
+        Ok(true)
     }
 }

@@ -143,12 +143,13 @@ impl Face {
         Target::new(&self.surface, &self.anchor)
     }
 
-    /// Where a picture of this size lies in a buffer for the window as it is now.
-    pub(in crate::sink::window) fn place(&self, picture: [u32; 2]) -> Placement {
+    /// Where a picture of this size lies in a buffer for the window as it is now, which has at most
+    /// `most` columns and rows.
+    pub(in crate::sink::window) fn place(&self, picture: [u32; 2], most: u32) -> Placement {
         let window = self.shared.size();
         match self.globals.stretch {
-            Stretch::No => Placement::scaled(picture, window),
-            Stretch::ByWinit | Stretch::ByUs(_) => Placement::padded(picture, window),
+            Stretch::No => Placement::limited(picture, window, most),
+            Stretch::ByWinit | Stretch::ByUs(_) => Placement::stretched(picture, window, most),
         }
     }
 
@@ -172,6 +173,13 @@ impl Face {
         if let Some(cell) = &mut self.cell {
             cell.put(self.shared.left());
         }
+        self.flush()
+    }
+
+    /// Commits what waits for a commit, and nothing if nothing does: when a driver took a frame and
+    /// did not commit it, word of that frame is still to be asked for.
+    pub(in crate::sink::window) fn commit_rest(&self) -> bool {
+        self.surface.commit();
         self.flush()
     }
 

@@ -59,6 +59,11 @@ impl Gate {
         self.0.load(Ordering::Relaxed)
     }
 
+    /// For a driver that has nothing to wait for.
+    pub(in crate::sink::window) fn reopen(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+
     pub(super) fn shut(&self) {
         self.0.store(false, Ordering::Relaxed);
     }

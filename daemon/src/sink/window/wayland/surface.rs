@@ -8,6 +8,7 @@ use tracing::{debug, warn};
 
 use super::face::{Face, Globals};
 use super::pool::{Buffer, Pool};
+use crate::sink::window::placement::MOST;
 use crate::sink::window::texels::Texels;
 
 /// A surface that the CPU draws on.
@@ -81,7 +82,7 @@ fn fit(pool: &mut Option<Pool>, retired: &mut Vec<Buffer>, face: &Face, picture:
         }
         !is_free
     });
-    let placement = face.place(picture);
+    let placement = face.place(picture, MOST);
     if pool.as_ref().is_some_and(|pool| pool.placement == placement) {
         return true;
     }
