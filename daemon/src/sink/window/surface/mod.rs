@@ -51,9 +51,7 @@ pub(super) enum Canvas {
 #[derive(Clone, Debug, thiserror::Error)]
 pub(super) enum SurfaceError {
     /// There is no device to draw on it.
-    #[error(
-        "expected a GPU adapter that makes the pictures, found the CPU; choose an adapter with --backend"
-    )]
+    #[error("the CPU makes the pictures")]
     NoGpu,
     /// The adapter has no way to this display.
     #[error(
