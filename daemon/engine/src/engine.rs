@@ -28,7 +28,7 @@ use crate::time::{MonoSpan, MonoTime};
 use crate::trajectory::flow::Flow;
 use crate::trajectory::ladder::Ladder;
 use crate::ui::{UiInput, UiLayer, composite};
-use crate::warp::linear::kept_keys;
+use crate::warp::linear::{MOST_KEYS, kept_keys};
 
 /// What an engine does and with how much of the machine.
 #[derive(Clone, Copy, Debug)]
@@ -486,8 +486,11 @@ impl Engine {
             let method = self.config.method.warp();
             let map = &self.scratch.map;
             let finish = self.finish.as_mut().zip(part).and_then(|(it, part)| it.split(part));
-            let past: Vec<_> = previous.into_iter().chain(&self.remembered).collect();
-            let frame = FrameInput { method, phase, newest: key, past: &past, map, finish };
+            let mut past = [key; MOST_KEYS];
+            let known = previous.into_iter().chain(&self.remembered);
+            let known = past.iter_mut().zip(known).map(|(past, key)| *past = key).count();
+            let past = &past[..known];
+            let frame = FrameInput { method, phase, newest: key, past, map, finish };
             self.backend.make(&self.pool, &frame, out, keeps)
         };
         if let Some((finish, part)) = self.finish.as_mut().zip(part).filter(|_| !is_finished) {
