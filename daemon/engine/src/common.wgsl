@@ -38,27 +38,27 @@ const NO_SOURCE: u32 = 0xffffffffu;
 const NO_CELL: u32 = 0xffffffffu;
 const SOURCE_BITS: u32 = 25u;
 const MAX_CELLS: u32 = 0x1ffffffu;
-// Listed cells of a workgroup, and workgroups of a row of them.
+// Listed items of a workgroup, and workgroups of a row of them.
 const LIST_GROUP: u32 = 64u;
 const GROUPS_OF_A_ROW: u32 = 1024u;
 
-// Some cells of the grid, in any order: the workgroups of a dispatch over them, how many they are,
-// and their indices.
-struct CellList {
+// Some cells of the grid or some pixels, in any order: the workgroups of a dispatch over them, how
+// many they are, and their indices.
+struct List {
     columns: u32,
     rows: u32,
     layers: u32,
     count: atomic<u32>,
-    cells: array<u32>,
+    items: array<u32>,
 }
 
 // The same where it is only read.
-struct ListedCells {
+struct Listed {
     columns: u32,
     rows: u32,
     layers: u32,
     count: u32,
-    cells: array<u32>,
+    items: array<u32>,
 }
 
 fn groups_of(count: u32) -> vec2<u32> {
@@ -66,7 +66,7 @@ fn groups_of(count: u32) -> vec2<u32> {
     return vec2<u32>(min(groups, GROUPS_OF_A_ROW), (groups + GROUPS_OF_A_ROW - 1u) / GROUPS_OF_A_ROW);
 }
 
-// Which of the listed cells an invocation of the dispatch is for.
+// Which of the listed items an invocation of the dispatch is for.
 fn place_in_list(id: vec3<u32>) -> u32 {
     return id.y * GROUPS_OF_A_ROW * LIST_GROUP + id.x;
 }

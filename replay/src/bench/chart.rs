@@ -11,7 +11,7 @@ use crate::draw::palette::{GRID, HUES, INK, MUTED, PANEL, Rgb};
 use crate::draw::{Anchor, Drawing, LogAxis, TextStyle};
 
 /// Side of the page, px.
-const PAGE: [u32; 2] = [1680, 800];
+const PAGE: [u32; 2] = [1800, 800];
 /// Top and bottom of the plots, px.
 const ROWS: [f32; 2] = [110.0, 690.0];
 /// Left and right of each plot, px.

@@ -11,7 +11,7 @@ pub struct Shader {
     pub file: &'static str,
     /// Its text: what it shares with others, then the file.
     pub parts: &'static [&'static str],
-    /// Buffers whose every byte is 0 when it begins.
+    /// Buffers whose every byte is 0 when it begins; of lists, what comes before the items.
     pub cleared: &'static [Slot],
     /// What is bound from slot 1 on, in order; slot 0 has [`crate::params::FrameParams`].
     pub bindings: &'static [Binding],
@@ -43,7 +43,7 @@ pub enum Extent {
     CellRows,
     /// Each [`STRIP`] rows of a column of the field grid.
     CellStrips,
-    /// Each cell that the list in a buffer has; it begins with the groups of the dispatch.
+    /// Each item of the list in a buffer, which begins with the groups of the dispatch.
     Listed(Slot),
     /// Each pixel of half of the valid rectangle, rounded up.
     HalfPixels,
@@ -117,6 +117,8 @@ pub enum Slot {
     BesideColumns,
     /// The broken cells.
     Broken,
+    /// The pixels of holes that the newest key does not show.
+    Hidden,
     /// Of some keys in turn the depth key of each cell, then how far each came since the key before;
     /// between two keys [`crate::warp::voxel::VoxelWords::past`].
     Was,
@@ -144,11 +146,25 @@ pub enum Slot {
     Out,
 }
 
+/// Words of a list before its items.
+pub const LIST_HEADER: u64 = 4;
+
 impl Slot {
     /// How many there are.
     pub const COUNT: usize = Self::Out as usize + 1;
+
+    /// Bytes that [`Shader::cleared`] means; None for all.
+    #[must_use]
+    pub const fn cleared_bytes(self) -> Option<u64> {
+        match self {
+            Self::Holes | Self::Broken | Self::Hidden => Some(4 * LIST_HEADER),
+            _ => None,
+        }
+    }
 }
 
+/// Storage buffers that a shader binds at most.
+pub const MOST_BINDINGS: u32 = 9;
 /// Rows of [`Extent::CellStrips`].
 pub const STRIP: u32 = 4;
 

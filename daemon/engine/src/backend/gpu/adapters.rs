@@ -1,9 +1,8 @@
 //! The GPU adapters of this machine.
 
 use crate::backend::choice::{AdapterFacts, AdapterKind};
+use crate::backend::shader::MOST_BINDINGS;
 
-/// Storage buffers that the largest kernel binds.
-const STORAGE_BUFFERS: u32 = 8;
 /// Invocations of the largest workgroup.
 const INVOCATIONS: u32 = 256;
 
@@ -68,7 +67,7 @@ impl GpuAdapter {
 /// The least that the kernels run with.
 fn needed() -> wgpu::Limits {
     wgpu::Limits {
-        max_storage_buffers_per_shader_stage: STORAGE_BUFFERS,
+        max_storage_buffers_per_shader_stage: MOST_BINDINGS,
         max_compute_invocations_per_workgroup: INVOCATIONS,
         ..wgpu::Limits::downlevel_defaults()
     }

@@ -26,7 +26,7 @@ pub use error::GpuError;
 pub use picture::GpuPicture;
 
 use super::FrameInput;
-use super::shader::{Extent, STRIP, Shader, Slot};
+use super::shader::{Extent, LIST_HEADER, STRIP, Shader, Slot};
 use crate::color::{ColorFormat, ColorPlane};
 use crate::field::FieldMap;
 use crate::fill::far_side::FAR_SIDE;
@@ -97,9 +97,6 @@ fn filling_shaders(method: Method) -> &'static [&'static Shader] {
 
 /// The shaders that finish a frame, in order.
 const FINISH_SHADERS: [&Shader; 2] = [&PYRAMID, &COMPENSATE];
-
-/// Words of a list of cells before the cells.
-const LIST_HEADER: u64 = 4;
 
 /// A shader of a method, ready to run.
 type Step = (&'static Shader, Arc<Compiled>);
@@ -311,10 +308,14 @@ impl GpuBackend {
     /// Gives every plane that only shaders write its size.
     fn make_room(&mut self, params: &FrameParams) -> Result<(), GpuError> {
         let area = |[width, height]: [u32; 2]| u64::from(width) * u64::from(height);
+        let limit = self.gpu.device.limits().max_storage_buffer_binding_size;
         for (shader, _) in self.key_steps.iter().chain(&self.frame_steps) {
             for slot in shader.bindings.iter().map(|binding| binding.slot()) {
                 let size = match slot {
                     Slot::Holes | Slot::Broken => 4 * (LIST_HEADER + area(params.cells)),
+                    // A picture as large as a binding has more pixels than that lists, but holes
+                    // have a surface to continue, which is no hole.
+                    Slot::Hidden => (4 * (LIST_HEADER + area(params.size))).min(limit),
                     Slot::Held
                     | Slot::Near
                     | Slot::Top
@@ -454,7 +455,7 @@ fn dispatch(
 ) -> Result<(), GpuError> {
     for (shader, compiled) in steps {
         for slot in shader.cleared {
-            commands.clear_buffer(planes.held(*slot)?, 0, None);
+            commands.clear_buffer(planes.held(*slot)?, 0, slot.cleared_bytes());
         }
         let group = planes.bind(gpu, shader, &compiled.layout)?;
         let mut pass = commands.begin_compute_pass(&Default::default());

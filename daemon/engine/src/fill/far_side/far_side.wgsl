@@ -8,7 +8,7 @@
 @group(0) @binding(3) var<storage, read_write> stacked_rows: array<u32>;
 // Nearest resolved column left and right of each cell.
 @group(0) @binding(4) var<storage, read_write> beside_columns: array<u32>;
-@group(0) @binding(5) var<storage, read> holes: ListedCells;
+@group(0) @binding(5) var<storage, read> holes: Listed;
 
 // No resolved row or column on this side.
 const NO_ROW: u32 = 0xffffu;
@@ -117,7 +117,7 @@ fn far_side(@builtin(global_invocation_id) id: vec3<u32>) {
     if place >= holes.count {
         return;
     }
-    let i = holes.cells[place];
+    let i = holes.items[place];
     let hole = vec2<u32>(i % params.cells.x, i / params.cells.x);
     let stacked = Sides(
         vertical(hole, stacked_rows[i] & 0xffffu), vertical(hole, stacked_rows[i] >> 16u),

@@ -6,11 +6,11 @@ use crate::backend::shader::{Binding, COLOR, COMMON, Entry, Extent, FIELD, Shade
 /// Text that both share: which surface a pixel of a broken cell shows, and which a hole continues.
 pub const HOLES: &str = include_str!("holes.wgsl");
 
-/// Equations (1) to (3), and (5).
+/// Equations (1) to (3), and (5); lists the pixels that (4) may show instead.
 pub const LINEAR: Shader = Shader {
     file: "linear.wgsl",
     parts: &[COMMON, FIELD, COLOR, HOLES, include_str!("linear.wgsl")],
-    cleared: &[],
+    cleared: &[Slot::Hidden],
     bindings: &[
         Binding::Read(Slot::Color),
         Binding::Write(Slot::Out),
@@ -20,10 +20,12 @@ pub const LINEAR: Shader = Shader {
         Binding::Read(Slot::Carried),
         Binding::Read(Slot::Origin),
         Binding::Read(Slot::Broken),
+        Binding::Write(Slot::Hidden),
     ],
     entries: &[
         Entry::tiles("warp_linear", Extent::Pixels),
         Entry::lines("warp_broken", Extent::Listed(Slot::Broken)),
+        Entry { name: "count_groups", extent: Extent::One, workgroup: [1, 1] },
     ],
 };
 
@@ -54,8 +56,9 @@ macro_rules! previous {
                 Binding::Read(Slot::Carried),
                 Binding::Read(Slot::Origin),
                 Binding::Read(Slot::Was),
+                Binding::Read(Slot::Hidden),
             ],
-            entries: &[Entry::tiles("fill_from_previous", Extent::Cells)],
+            entries: &[Entry::lines("fill_from_previous", Extent::Listed(Slot::Hidden))],
         }
     };
 }

@@ -2,7 +2,9 @@
 // `fill.rs`.
 
 // The cells that are broken.
-@group(0) @binding(8) var<storage, read> broken: ListedCells;
+@group(0) @binding(8) var<storage, read> broken: Listed;
+// The pixels of holes that (3) does not show, whose surface is known: `previous.wgsl` may.
+@group(0) @binding(9) var<storage, read_write> hidden: List;
 
 // (1) everywhere; what is wrong in broken cells is made anew by `warp_broken`, and only there.
 @compute @workgroup_size(16, 16)
@@ -27,15 +29,31 @@ fn warp_broken(@builtin(global_invocation_id) id: vec3<u32>) {
     if place >= broken.count {
         return;
     }
-    let i = broken.cells[place];
+    let i = broken.items[place];
     let cell = vec2<u32>(i % params.cells.x, i / params.cells.x);
     let pixels = pixels_of(cell);
     for (var y = pixels.first.y; y < pixels.end.y; y++) {
         for (var x = pixels.first.x; x < pixels.end.x; x++) {
             let pixel = params.valid_start + vec2<u32>(x, y);
             let p = vec2<i32>(pixel << vec2<u32>(8u));
-            write_out(pixel, sample(broken_place(cell, p)));
+            write_out(pixel, sample(broken_place(cell, pixel, p)));
         }
+    }
+}
+
+@compute @workgroup_size(1, 1)
+fn count_groups() {
+    let groups = groups_of(min(atomicLoad(&hidden.count), arrayLength(&hidden.items)));
+    hidden.columns = groups.x;
+    hidden.rows = groups.y;
+    hidden.layers = 1u;
+}
+
+// In which order pixels are listed makes no difference to the picture.
+fn list_hidden(pixel: vec2<u32>) {
+    let place = atomicAdd(&hidden.count, 1u);
+    if place < arrayLength(&hidden.items) {
+        hidden.items[place] = pixel.y * params.size.x + pixel.x;
     }
 }
 
@@ -60,15 +78,15 @@ fn lerp(a: vec2<i32>, b: vec2<i32>, way: i32) -> vec2<i32> {
 
 // Where in the key a pixel of a broken cell is read: (2), and where that finds nothing, (3) and
 // (5).
-fn broken_place(cell: vec2<u32>, p: vec2<i32>) -> vec2<i32> {
+fn broken_place(cell: vec2<u32>, pixel: vec2<u32>, p: vec2<i32>) -> vec2<i32> {
     let found = find_surface(cell, p);
     if found.is_there {
         return found.place;
     }
-    return hole_place(cell, p);
+    return hole_place(cell, pixel, p);
 }
 
-fn hole_place(cell: vec2<u32>, p: vec2<i32>) -> vec2<i32> {
+fn hole_place(cell: vec2<u32>, pixel: vec2<u32>, p: vec2<i32>) -> vec2<i32> {
     let far = far_cell(cell);
     if far == NO_CELL {
         return p;
@@ -81,6 +99,7 @@ fn hole_place(cell: vec2<u32>, p: vec2<i32>) -> vec2<i32> {
     if is_far(q, depth) {
         return far_place(q, depth);
     }
+    list_hidden(pixel);
     // (5)
     let half = params.one_cell >> 1u;
     let middle = centre(vec2<u32>(far % params.cells.x, far / params.cells.x));

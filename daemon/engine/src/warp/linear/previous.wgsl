@@ -4,41 +4,34 @@
 
 // Of some keys in turn: depth keys, then how far the cells came since the key before.
 @group(0) @binding(8) var<storage, read> was: array<u32>;
+// Pixels of holes that the newest key does not show, whose surface is known.
+@group(0) @binding(9) var<storage, read> hidden: Listed;
 
 const DEPTH_SHIFT: u32 = 5u;
 const MOST_KEYS: u32 = 4u;
 const REACH: i32 = 16;
 const STEADY: i32 = 16;
 
-// An invocation for each cell.
-@compute @workgroup_size(16, 16)
+// An invocation for each pixel of a hole that the newest key does not show.
+@compute @workgroup_size(64, 1)
 fn fill_from_previous(@builtin(global_invocation_id) id: vec3<u32>) {
-    let cell = id.xy;
-    if !is_inside(cell, params.cells) || !is_broken(cell) {
+    let place = place_in_list(id);
+    if place >= min(hidden.count, arrayLength(&hidden.items)) {
         return;
     }
+    let i = hidden.items[place];
+    let pixel = vec2<u32>(i % params.size.x, i / params.size.x);
+    let index = pixel - params.valid_start;
+    let cell = vec2<u32>(place_x(index.x).cell, place_y(index.y).cell);
     let far = far_cell(cell);
-    if far == NO_CELL {
-        return;
-    }
     let way = way_of(cell, far);
     if way.count <= LEVEL {
         return;
     }
-    let source = origin[far];
-    let d = displacement(held[source]);
-    let pixels = pixels_of(cell);
-    for (var y = pixels.first.y; y < pixels.end.y; y++) {
-        for (var x = pixels.first.x; x < pixels.end.x; x++) {
-            let pixel = params.valid_start + vec2<u32>(x, y);
-            let p = vec2<i32>(pixel << vec2<u32>(8u));
-            let q = p - d;
-            if is_first_seen(way, q) && !find_surface(cell, p).is_there
-                && !is_far(clamp_valid(q), near[source]) {
-                let place = unmixed(q - way.totals[LEVEL], way.depths[LEVEL]);
-                write_out(pixel, sample(place));
-            }
-        }
+    let p = vec2<i32>(pixel << vec2<u32>(8u));
+    let q = p - displacement(held[origin[far]]);
+    if is_first_seen(way, q) {
+        write_out(pixel, sample(unmixed(q - way.totals[LEVEL], way.depths[LEVEL])));
     }
 }
 

@@ -2,7 +2,7 @@
 // `cpu.rs`.
 
 @group(0) @binding(1) var<storage, read> carried: array<u32>;
-@group(0) @binding(2) var<storage, read_write> broken: CellList;
+@group(0) @binding(2) var<storage, read_write> broken: List;
 
 const LOWEST: i32 = -32768;
 // Rows of cells that an invocation goes down, keeping what neighbours share.
@@ -38,7 +38,7 @@ fn classify(@builtin(global_invocation_id) id: vec3<u32>) {
         let agrees = (low != vec2<i32>(LOWEST)) & (ranges <= vec2<u32>(params.smooth_limit));
         if !all(agrees) {
             // In which order they are listed makes no difference to the picture.
-            broken.cells[atomicAdd(&broken.count, 1u)] = cell_index(vec2<u32>(id.x, y));
+            broken.items[atomicAdd(&broken.count, 1u)] = cell_index(vec2<u32>(id.x, y));
         }
         above = here;
         here = below;

@@ -4,7 +4,7 @@
 @group(0) @binding(2) var<storage, read> splat: array<u32>;
 @group(0) @binding(3) var<storage, read_write> carried: array<u32>;
 @group(0) @binding(4) var<storage, read_write> origin: array<u32>;
-@group(0) @binding(5) var<storage, read_write> holes: CellList;
+@group(0) @binding(5) var<storage, read_write> holes: List;
 
 @compute @workgroup_size(16, 16)
 fn resolve(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -27,7 +27,7 @@ fn resolve(@builtin(global_invocation_id) id: vec3<u32>) {
 
 // In which order cells are listed makes no difference to the picture.
 fn list(i: u32) {
-    holes.cells[atomicAdd(&holes.count, 1u)] = i;
+    holes.items[atomicAdd(&holes.count, 1u)] = i;
 }
 
 @compute @workgroup_size(1, 1)

@@ -2,7 +2,7 @@
 // it.
 
 // The cells that are broken.
-@group(0) @binding(8) var<storage, read> broken: ListedCells;
+@group(0) @binding(8) var<storage, read> broken: Listed;
 
 // As if every cell were smooth; what is wrong in broken cells is made anew by `warp_broken`.
 @compute @workgroup_size(16, 16)
@@ -31,7 +31,7 @@ fn warp_broken(@builtin(global_invocation_id) id: vec3<u32>) {
     if place >= broken.count {
         return;
     }
-    let i = broken.cells[place];
+    let i = broken.items[place];
     let cell = vec2<u32>(i % params.cells.x, i / params.cells.x);
     let pixels = pixels_of(cell);
     for (var y = pixels.first.y; y < pixels.end.y; y++) {
