@@ -130,8 +130,8 @@ pub struct Engine {
     previous: Option<KeyFrame>,
     /// The keys before that, from the newest on, which holes may show.
     remembered: Vec<KeyFrame>,
-    /// A key frame that is no longer needed, whose buffers the next one takes over.
-    spare: KeyFrame,
+    /// Key frames that are no longer needed, whose buffers the next ones take over.
+    spares: Vec<KeyFrame>,
     scratch: Scratch,
     /// Of methods whose trajectories are more than the motion field.
     ladder: Option<Ladder>,
@@ -169,7 +169,7 @@ impl Engine {
             newest: None,
             previous: None,
             remembered: Vec::new(),
-            spare: KeyFrame::default(),
+            spares: Vec::new(),
             scratch: Scratch::default(),
             ladder: Ladder::new(config.method, config.pixels_per_degree),
             backend: Backend::default(),
@@ -266,15 +266,22 @@ impl Engine {
             motion_from: input.motion_from.filter(|_| !is_by_flow),
             ..*input
         };
+        let mut key = self.spares.pop().unwrap_or_default();
         let noticed = decode_key(
             &self.pool,
             &self.format,
             &seen,
             self.config.pixels_per_degree,
             &mut self.scratch.decode,
-            &mut self.spare,
-        )?;
-        let mut key = std::mem::take(&mut self.spare);
+            &mut key,
+        );
+        let noticed = match noticed {
+            Ok(noticed) => noticed,
+            Err(error) => {
+                self.spares.push(key);
+                return Err(error);
+            }
+        };
         if let Some(multiplex) = &mut self.multiplex {
             let from = self.scratch.decode.reduced_color();
             let reduced = noticed.reduced.map(|part| (from, part));
@@ -321,10 +328,11 @@ impl Engine {
         }
         let newest = self.newest.replace(key);
         let dropped = std::mem::replace(&mut self.previous, newest);
-        self.spare = dropped.and_then(|dropped| self.remember(dropped)).unwrap_or_default();
+        let dropped = dropped.and_then(|dropped| self.remember(dropped));
+        self.spares.extend(dropped);
         if input.is_cut {
-            self.spare = self.previous.take().unwrap_or_default();
-            self.remembered.clear();
+            self.spares.extend(self.previous.take());
+            self.spares.append(&mut self.remembered);
         }
         Ok(KeyReport {
             work: (self.config.timer)() - started_at,
@@ -336,11 +344,15 @@ impl Engine {
     /// Keeps `key`, the one before the previous key, where holes may show it. Returns a key that is
     /// no longer needed.
     fn remember(&mut self, key: KeyFrame) -> Option<KeyFrame> {
+        if self.config.method.warp() != Method::Linear {
+            self.remembered.clear();
+            self.spares.clear();
+            return Some(key);
+        }
         let cells = key.velocity.data().len();
         // Of a key without depth or motion no hole shows anything, nor of what lies before it.
-        let is_useful = !key.depth.data().is_empty() && cells > 0;
-        if self.config.method.warp() != Method::Linear || !is_useful {
-            self.remembered.clear();
+        if key.depth.data().is_empty() || cells == 0 {
+            self.spares.append(&mut self.remembered);
             return Some(key);
         }
         self.remembered.insert(0, key);

@@ -2,7 +2,10 @@
 
 use super::*;
 use crate::finish::FinishMode;
-use crate::format::{CameraMotion, MotionConvention, MotionDirection, MotionFormat, MotionUnit};
+use crate::format::{
+    CameraMotion, DepthConvention, DepthFormat, DepthMeaning, MotionConvention, MotionDirection,
+    MotionFormat, MotionUnit,
+};
 use crate::key::PlaneInput;
 
 mod change_of_method;
@@ -84,6 +87,38 @@ fn blend_is_the_mean_strictly_between_the_keys_and_a_key_elsewhere() {
             assert_eq!(u32::from(mean), (u32::from(*a) + u32::from(*b)).div_ceil(2));
         }
     }
+}
+
+#[test]
+fn a_cut_lets_go_of_no_key_frame_and_what_follows_needs_no_other() {
+    let mut engine = engine(Method::Linear);
+    let (color, motion) = ([7; 4 * 256], [0; 8 * 256]);
+    let depth: Vec<u8> = (0..256).flat_map(|_| 0.5_f32.to_le_bytes()).collect();
+    let plane = |bytes, bytes_per_pixel| PlaneInput::packed(bytes, [SIZE, SIZE], bytes_per_pixel);
+    engine.format.depth =
+        Some(DepthConvention { format: DepthFormat::F32, meaning: DepthMeaning::LinearView });
+    let mut held = Vec::new();
+    for index in 0..24 {
+        let content_time = MonoTime::ZERO + MonoSpan::from_ms(25 * (index as i64 + 1));
+        let input = KeyInput {
+            index,
+            content_time,
+            motion_from: Some(content_time - MonoSpan::from_ms(25)),
+            is_cut: index % 8 == 0,
+            color: plane(&color, 4),
+            depth: Some(plane(&depth, 4)),
+            motion: Some(plane(&motion, 8)),
+            mask: None,
+            camera: None,
+            motion_from_camera: None,
+        };
+        engine.push_key(&input).unwrap();
+        let keys = engine.newest.iter().chain(&engine.previous).chain(&engine.remembered);
+        held.push(keys.chain(&engine.spares).count());
+    }
+    let most = held[7];
+    assert!(most > MOST_KEYS, "the memory is full before the second cut");
+    assert!(held[8..].iter().all(|count| *count == most), "{held:?}");
 }
 
 #[test]
