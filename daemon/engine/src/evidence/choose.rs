@@ -1,8 +1,10 @@
 //! (4) of [`super`], and the choice.
 
+use std::sync::atomic::{AtomicU16, Ordering};
+
 use rayon::ThreadPool;
 
-use super::{Lead, MIXED, PerRung, RUNGS, Sample, index_of, unproven};
+use super::{Lead, MIXED, PerRung, RUNGS, Sample, bit_of, index_of, unproven};
 use crate::bands::for_each_row;
 use crate::plane::Plane;
 use crate::trajectory::camera_path::CameraOrder;
@@ -37,13 +39,7 @@ pub(super) fn choose(
     leads: &mut Plane<Lead>,
 ) -> Rung {
     leads.resize(samples.width(), samples.height());
-    let (mut sum, mut count) = (PerRung::default(), 0.0);
-    for sample in samples.data().iter().filter(|sample| sample.keys > 0) {
-        for (sum, mean) in sum.iter_mut().zip(sample.mean) {
-            *sum += mean;
-        }
-        count += 1.0;
-    }
+    let (sum, count) = total(pool, samples);
     if count == 0.0 {
         leads.data_mut().fill(Lead::by(image));
         return image;
@@ -79,6 +75,34 @@ pub(super) fn choose(
     image
 }
 
+/// Sum of m over the samples that something is known of, and their number: row by row, so that
+/// threads can share them.
+fn total(pool: &ThreadPool, samples: &Plane<Sample>) -> (PerRung, f32) {
+    let mut rows = Plane::new(1, samples.height());
+    for_each_row(
+        pool,
+        &mut rows,
+        #[inline(always)]
+        |row, total: &mut [(PerRung, f32)]| {
+            let (sum, count) = &mut total[0];
+            for sample in samples.row(row).iter().filter(|sample| sample.keys > 0) {
+                for (sum, mean) in sum.iter_mut().zip(sample.mean) {
+                    *sum += mean;
+                }
+                *count += 1.0;
+            }
+        },
+    );
+    let mut total = (PerRung::default(), 0.0);
+    for (sum, count) in rows.data() {
+        for (total, sum) in total.0.iter_mut().zip(sum) {
+            *total += sum;
+        }
+        total.1 += count;
+    }
+    total
+}
+
 /// Whether the rung of a sample goes without saying: [`Rung::Linear`] or [`Rung::Hold`], which has
 /// met some keys to a tenth of a pixel, while the cheaper ones have not met them at all.
 #[inline(always)]
@@ -91,30 +115,55 @@ fn is_settled(sample: &Sample) -> bool {
         && cheaper.iter().all(|mean| *mean > CLEARLY)
 }
 
-/// Marks for every sample whether those around it take its rung.
-pub(super) fn share(pool: &ThreadPool, leads: &Plane<Lead>, shared: &mut Plane<u8>) {
+/// Marks for every sample whether those around it take its rung. `whole` is between two steps.
+/// Returns which rungs are taken, as [`super::Evidence::taken`].
+pub(super) fn share(
+    pool: &ThreadPool,
+    leads: &Plane<Lead>,
+    whole: &mut Plane<u8>,
+    shared: &mut Plane<u8>,
+) -> u16 {
     let [width, height] = [leads.width(), leads.height()];
+    whole.resize(width, height);
     shared.resize(width, height);
+    let taken = AtomicU16::new(0);
+    for_each_row(
+        pool,
+        whole,
+        #[inline(always)]
+        |row, whole| {
+            let mut bits = 0;
+            for (whole, lead) in whole.iter_mut().zip(leads.row(row)) {
+                bits |= bit_of(lead.rung);
+                *whole = if lead.share == Lead::WHOLE { index_of(lead.rung) as u8 } else { MIXED };
+            }
+            taken.fetch_or(bits, Ordering::Relaxed);
+        },
+    );
+    let whole = &*whole;
     for_each_row(
         pool,
         shared,
         #[inline(always)]
         |row, shared| {
             let rows = [row.saturating_sub(1), row, (row + 1).min(height - 1)];
-            let rows = rows.map(|row| leads.row(row));
-            for (column, shared) in shared.iter_mut().enumerate() {
-                let own = rows[1][column];
-                let columns = column.saturating_sub(1)..(column + 2).min(width as usize);
-                let is_shared =
-                    rows.iter().all(|row| row[columns.clone()].iter().all(|lead| *lead == own));
-                *shared = if is_shared && own.share == Lead::WHOLE {
-                    index_of(own.rung) as u8
-                } else {
-                    MIXED
-                };
+            let [above, own, below] = rows.map(|row| &whole.row(row)[..shared.len()]);
+            for ((shared, own), (above, below)) in
+                shared.iter_mut().zip(own).zip(above.iter().zip(below))
+            {
+                *shared = if (above == own) & (below == own) { *own } else { MIXED };
+            }
+            // Of the columns beside one, the left one has been overwritten.
+            let mut left = shared.first().copied().unwrap_or(MIXED);
+            for column in 0..shared.len() {
+                let here = shared[column];
+                let right = shared.get(column + 1).copied().unwrap_or(here);
+                shared[column] = if (left == here) & (right == here) { here } else { MIXED };
+                left = here;
             }
         },
     );
+    taken.into_inner()
 }
 
 /// What the samples of a surface around one say.

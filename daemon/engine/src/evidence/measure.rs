@@ -18,15 +18,17 @@ use crate::trajectory::lattice::Lattice;
 use crate::trajectory::models::Models;
 use crate::trajectory::quadratic::Quadratic;
 use crate::trajectory::rung::Rung;
-use crate::trajectory::surface::{Around, is_same_surface};
+use crate::trajectory::surface::{is_same_surface, nearest_cell};
 
 /// c of (2), pixels at the next key: an in-between frame in the middle has half of the error or
 /// less, and a picture loses most of its contrast where it is a pixel off.
 const CONTRAST_PX: f32 = 2.0;
 /// Keys that (3) averages over.
 const KEYS: u8 = 4;
+/// 1 / n of (3).
+const SHARES: [f32; KEYS as usize + 1] = [1.0, 1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0];
 /// A rung with a larger (2) than this has failed: a fifth of a pixel.
-const FAILED: f32 = 0.01;
+pub(super) const FAILED: f32 = 0.01;
 
 /// (2) up to which flow has met the next key's: that of a pixel. Chance does not, from key to key.
 const FORESEEN: f32 = 0.2;
@@ -69,6 +71,16 @@ struct Seen {
     depth: u32,
     /// Whether flow says so, and not the motion of the surface.
     is_flow: bool,
+}
+
+/// What the rung in use said of a sample.
+pub(super) struct ByUsed {
+    pub(super) used: Rung,
+    /// Where it had said that the sample would be by now.
+    pub(super) foreseen: [f32; 2],
+    pub(super) has_failed: bool,
+    /// (2) of hold, of linear and of the rung in use.
+    pub(super) errors: [f32; 3],
 }
 
 /// What is measured beside the new key itself.
@@ -120,8 +132,9 @@ impl Measuring<'_> {
             traces,
             #[inline(always)]
             |row, samples, traces| {
-                for (column, (sample, trace)) in (0..).zip(samples.iter_mut().zip(traces)) {
-                    (*sample, *trace) = self.follow(known, column, row);
+                let runs = samples.chunks_mut(LANES).zip(traces.chunks_mut(LANES));
+                for (first, (samples, traces)) in (0..).step_by(LANES).zip(runs) {
+                    self.follow_run(known, [first, row], samples, traces);
                 }
             },
         );
@@ -142,7 +155,8 @@ impl Measuring<'_> {
                 if !moves_with_world && !is_flow {
                     sample.share = share(d, trace.foreseen, &now);
                 }
-                self.take_in(sample, trace.cell, &now, |_| true);
+                let history = self.history(trace.cell, sample.depth);
+                self.take_in(sample, history, &now, |_| true);
                 if moves_with_world {
                     let of_orders = &now[WORLD..][..CameraOrder::ALL.len()];
                     for (sum, error) in sums[0].iter_mut().zip(of_orders) {
@@ -176,9 +190,14 @@ impl Measuring<'_> {
 
     /// Follows one sample back, and measures what costs little.
     #[inline(always)]
-    fn follow(&self, predictions: &Predictions<'_>, column: u32, row: u32) -> (Sample, Trace) {
+    pub(super) fn follow(
+        &self,
+        predictions: &Predictions<'_>,
+        column: u32,
+        row: u32,
+    ) -> (Sample, Trace) {
         let Seen { d, depth, .. } = self.seen(predictions, column, row);
-        let mut sample = Sample { depth, ..Sample::default() };
+        let sample = Sample { depth, ..Sample::default() };
         let mut trace = Trace::default();
         let at = self.lattice.place(column, row);
         let has_depth = !predictions.key.depth.data().is_empty();
@@ -192,41 +211,64 @@ impl Measuring<'_> {
         )]
         let cell = [x as u16, y as u16];
         (trace.cell, trace.is_known) = (cell, true);
-        let is_its_turn = (column / LANES as u32 + TURN_STEP * row) % self.turn[0] == self.turn[1];
         if self.orders_alone {
-            trace.needs_all = is_its_turn;
+            trace.needs_all = self.is_turn_of([column, row]);
             return (sample, trace);
         }
         let history = self.history(cell, depth);
         let used = history.map_or(self.image_rung, |history| history.lead.rung);
-        let mut now = PerRung::default();
         let straight = straight(predictions, x, y);
-        now[HOLD] = error([0.0; 2], d);
-        now[LINEAR] = error(straight, d);
-        let used_index = index_of(used);
         let foreseen = match used {
             Rung::Hold => Some([0.0; 2]),
             Rung::Linear => Some(straight),
             _ => predicted(predictions, used, cell),
         };
-        now[used_index] = foreseen.map_or(now[LINEAR], |foreseen| error(foreseen, d));
-        trace.foreseen = foreseen.unwrap_or(straight);
-        trace.needs_all = is_its_turn || foreseen.is_none() || now[used_index] > FAILED;
-        if trace.needs_all {
+        let of_linear = error(straight, d);
+        let of_used = foreseen.map_or(of_linear, |foreseen| error(foreseen, d));
+        let by_used = ByUsed {
+            used,
+            foreseen: foreseen.unwrap_or(straight),
+            has_failed: foreseen.is_none() || of_used > FAILED,
+            errors: [error([0.0; 2], d), of_linear, of_used],
+        };
+        self.take_in_used([column, row], cell, depth, history, &by_used)
+    }
+
+    /// Whether it is the turn of a sample to be measured by the whole ladder.
+    #[inline(always)]
+    fn is_turn_of(&self, [column, row]: [u32; 2]) -> bool {
+        (column / LANES as u32 + TURN_STEP * row) % self.turn[0] == self.turn[1]
+    }
+
+    /// Makes the sample at `at`, which was at `cell`, from what costs little.
+    #[inline(always)]
+    pub(super) fn take_in_used(
+        &self,
+        at: [u32; 2],
+        cell: [u16; 2],
+        depth: u32,
+        history: Option<&Sample>,
+        by_used: &ByUsed,
+    ) -> (Sample, Trace) {
+        let ByUsed { used, foreseen, has_failed, errors: [of_hold, of_linear, of_used] } = *by_used;
+        let mut sample = Sample { depth, ..Sample::default() };
+        let needs_all = has_failed || self.is_turn_of(at);
+        let trace = Trace { cell, is_known: true, needs_all, foreseen };
+        if needs_all {
             return (sample, trace);
         }
         // What is richer has nothing left to explain.
-        let of_used = now[used_index];
-        now[used_index + 1..].fill(of_used);
-        now[LINEAR] = error(straight, d);
+        let used_index = index_of(used);
+        let mut now = [of_used; RUNGS.len()];
+        (now[HOLD], now[LINEAR]) = (of_hold, of_linear);
         let is_measured = |index| index == HOLD || index == LINEAR || index >= used_index;
-        self.take_in(&mut sample, cell, &now, is_measured);
+        self.take_in(&mut sample, history, &now, is_measured);
         (sample, trace)
     }
 
     /// What was known of the surface of depth key `depth` at a cell of the key before.
     #[inline(always)]
-    fn history(&self, [x, y]: [u16; 2], depth: u32) -> Option<&Sample> {
+    pub(super) fn history(&self, [x, y]: [u16; 2], depth: u32) -> Option<&Sample> {
         let (column, row) = (u32::from(x) / STRIDE, u32::from(y) / STRIDE);
         if column >= self.before.width() || row >= self.before.height() {
             return None;
@@ -240,11 +282,11 @@ impl Measuring<'_> {
     fn take_in(
         &self,
         sample: &mut Sample,
-        cell: [u16; 2],
+        history: Option<&Sample>,
         now: &PerRung,
         is_measured: impl Fn(usize) -> bool,
     ) {
-        let Some(history) = self.history(cell, sample.depth) else {
+        let Some(history) = history else {
             // What nobody has measured is no better than nothing.
             for (index, (mean, now)) in sample.mean.iter_mut().zip(now).enumerate() {
                 *mean = if is_measured(index) { *now } else { 1.0 };
@@ -254,11 +296,13 @@ impl Measuring<'_> {
         };
         sample.lead = history.lead;
         sample.keys = (history.keys + 1).min(KEYS);
-        let share = 1.0 / f32::from(sample.keys);
-        let means = sample.mean.iter_mut().zip(history.mean.iter().zip(now));
-        for (index, (mean, (before, now))) in means.enumerate() {
-            let way = if is_measured(index) { now - before } else { 0.0 };
-            *mean = before + way * share;
+        let share = SHARES[usize::from(sample.keys)];
+        let mut aims = history.mean;
+        for (index, (aim, now)) in aims.iter_mut().zip(now).enumerate() {
+            *aim = if is_measured(index) { *now } else { *aim };
+        }
+        for ((mean, before), aim) in sample.mean.iter_mut().zip(&history.mean).zip(aims) {
+            *mean = before + (aim - before) * share;
         }
     }
 }
@@ -297,8 +341,7 @@ const TURN_STEP: u32 = 5;
 #[inline(always)]
 fn cell_at(predictions: &Predictions<'_>, was: [f32; 2], depth: Option<u32>) -> Option<[u32; 2]> {
     let (key, grid) = (predictions.key, predictions.models.grid());
-    let around = Around::new(grid, was)?;
-    around.nearest(key, depth).map(|(x, y)| [x, y])
+    nearest_cell(key, grid, was, depth).map(|(x, y)| [x, y])
 }
 
 /// Fits the affine maps of the older key that the whole ladder is measured by.
@@ -345,7 +388,7 @@ fn straight(predictions: &Predictions<'_>, x: u32, y: u32) -> [f32; 2] {
 
 /// (1) and (2).
 #[inline(always)]
-fn error(predicted: [f32; 2], d: [f32; 2]) -> f32 {
+pub(super) fn error(predicted: [f32; 2], d: [f32; 2]) -> f32 {
     let (dx, dy) = (predicted[0] - d[0], predicted[1] - d[1]);
     let square = dx * dx + dy * dy;
     if square.is_finite() { square / (square + CONTRAST_PX * CONTRAST_PX) } else { 1.0 }

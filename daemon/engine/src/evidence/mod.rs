@@ -36,6 +36,7 @@
 //! so that the number of threads changes nothing.
 
 mod choose;
+mod eight;
 mod measure;
 #[cfg(test)]
 mod tests;
@@ -85,6 +86,11 @@ pub const fn index_of(rung: Rung) -> usize {
         Rung::World(order) => WORLD + order as usize,
         Rung::Flow => 8,
     }
+}
+
+/// Of [`Evidence::taken`].
+const fn bit_of(rung: Rung) -> u16 {
+    1 << index_of(rung)
 }
 
 /// The rung of a surface that nothing was measured of, where the image takes `image`. Rungs below
@@ -142,6 +148,14 @@ pub struct Sample {
     share: u8,
 }
 
+impl Sample {
+    /// The rung that led it so far.
+    #[inline(always)]
+    fn rung(&self) -> Rung {
+        self.lead.rung
+    }
+}
+
 impl Default for Sample {
     /// Of nothing that is known.
     fn default() -> Self {
@@ -167,8 +181,12 @@ pub struct Evidence {
     older: Plane<Sample>,
     traces: Plane<Trace>,
     leads: Plane<Lead>,
+    /// Per sample the index of the rung that it takes whole, or [`MIXED`].
+    whole: Plane<u8>,
     /// Per sample the index of the rung that it and all around it take, or [`MIXED`].
     shared: Plane<u8>,
+    /// Which rungs some sample takes, by their indices.
+    taken: u16,
     trust: Trust,
     /// Whether nothing moves in the newest key.
     is_at_rest: bool,
@@ -189,7 +207,9 @@ impl Default for Evidence {
             older: Plane::default(),
             traces: Plane::default(),
             leads: Plane::default(),
+            whole: Plane::default(),
             shared: Plane::default(),
+            taken: 0,
             trust: Trust::default(),
             is_at_rest: false,
             count: 0,
@@ -245,7 +265,7 @@ impl Evidence {
 
     /// Gives every sample its rung.
     fn choose_rungs(&mut self, pool: &ThreadPool, models: &Models) {
-        let Self { samples, leads, shared, trust, order, image_rung, .. } = self;
+        let Self { samples, leads, whole, shared, taken, trust, order, image_rung, .. } = self;
         *image_rung = choose::choose(pool, *order, *image_rung, samples, leads);
         // The next key's history.
         for (sample, lead) in samples.data_mut().iter_mut().zip(leads.data()) {
@@ -264,7 +284,7 @@ impl Evidence {
                 }
             }
         }
-        choose::share(pool, leads, shared);
+        *taken = choose::share(pool, leads, whole, shared);
     }
 
     /// Nothing moves in the newest key, which says nothing of how things move: it is held, and all
@@ -277,6 +297,7 @@ impl Evidence {
         self.is_at_rest = true;
         self.leads.data_mut().fill(Lead::by(Rung::Hold));
         self.shared.data_mut().fill(index_of(Rung::Hold) as u8);
+        self.taken = bit_of(Rung::Hold);
         true
     }
 
@@ -296,21 +317,27 @@ impl Evidence {
     /// Forgets everything: the scene is another.
     pub fn cut(&mut self) {
         let kept = std::mem::take(self);
-        let Self { samples, older, traces, leads, shared, .. } = kept;
-        *self = Self { samples, older, traces, leads, shared, ..Self::default() };
+        let Self { samples, older, traces, leads, whole, shared, .. } = kept;
+        *self = Self { samples, older, traces, leads, whole, shared, ..Self::default() };
         for plane in [&mut self.samples, &mut self.older] {
             plane.data_mut().fill(Sample::default());
         }
         self.leads.data_mut().fill(Lead::by(self.image_rung));
         self.shared.data_mut().fill(index_of(self.image_rung) as u8);
+        self.taken = bit_of(self.image_rung);
     }
 
     /// Whether the homography of the key to come is wanted: it is in use, or one of a few keys by
     /// which it is judged.
     #[must_use]
     pub fn asks_for_global(&self) -> bool {
-        let is_used = || self.leads.data().iter().any(|lead| lead.rung == Rung::Global);
-        self.count.is_multiple_of(GLOBAL_KEYS) || is_used()
+        self.count.is_multiple_of(GLOBAL_KEYS) || self.takes(Rung::Global)
+    }
+
+    /// Whether some sample takes `rung`.
+    #[must_use]
+    pub fn takes(&self, rung: Rung) -> bool {
+        self.taken & bit_of(rung) != 0
     }
 
     /// How the camera goes on best.

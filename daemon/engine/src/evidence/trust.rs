@@ -40,8 +40,11 @@ const WORTH: f64 = 0.9;
 const MOVED_PX: f32 = 0.5;
 /// Fewest samples that tell: the ratio of two sums over so many is good to a fifth.
 const MIN_SAMPLES: i64 = 24;
-/// Lattice points from which on half of them are read, in turn.
+/// Lattice points of which all are read; of more, every other one or every fourth, in turn.
 const MANY_POINTS: u32 = 4096;
+const FOUR_TIMES: u32 = 4 * MANY_POINTS;
+/// How far along those that are read lie in the next row: not below each other.
+const TURN_STEP: u32 = 3;
 /// Correlation of a picture with the one before below which it is another: a surface that is seen
 /// again has most of its contrast in common with itself, two places have what chance gives them.
 const SAME: f64 = 0.3;
@@ -155,7 +158,7 @@ pub(super) struct Trust {
 
 impl Trust {
     /// Looks at what the motion of `key`, whose field is that of `lattice`, makes of `older`, which
-    /// it points back to. `turn` says which half of the samples are read.
+    /// it points back to. `turn` says which of the samples are read, where not all are.
     pub(super) fn update(
         &mut self,
         pool: &ThreadPool,
@@ -253,11 +256,15 @@ impl Trust {
     ) {
         let [columns, rows] = lattice.points();
         let step = Step { planes, valid, lattice };
-        let every = if columns * rows < MANY_POINTS { 1 } else { 2 };
+        let every = match columns * rows {
+            ..MANY_POINTS => 1,
+            MANY_POINTS..FOUR_TIMES => 2,
+            _ => 4,
+        };
         for_each_region_row(pool, &mut self.sums, |row, sums| {
             sums.fill(Sums::default());
             for y in row * REGION..((row + 1) * REGION).min(rows) {
-                for x in ((y + turn) % every..columns).step_by(every as usize) {
+                for x in ((TURN_STEP * y + turn) % every..columns).step_by(every as usize) {
                     step.take_in(x, y, &mut sums[(x / REGION) as usize]);
                 }
             }

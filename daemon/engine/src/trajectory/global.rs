@@ -16,6 +16,7 @@ use super::curve::Curve;
 use super::grid::Grid;
 use crate::key::KeyFrame;
 use crate::plane::Rect;
+use crate::simd::widest;
 
 /// Samples of the field along its longer side.
 const SAMPLES: u32 = 48;
@@ -116,20 +117,20 @@ fn samples(key: &KeyFrame, grid: &Grid, centre: [f64; 2], scale: f64) -> Vec<Sam
     samples
 }
 
+/// The unknowns of (1) in the equation of either axis, and in the end its right side.
+const HELD: [[usize; 6]; 2] = [[0, 1, 2, 6, 7, 8], [3, 4, 5, 6, 7, 8]];
+
 /// The homography of least squares with its last element 1: normal equations of (1).
 fn solve(samples: &[Sample]) -> Option<DMat3> {
+    let sums = widest(
+        #[inline(always)]
+        || normal_sums(samples),
+    );
     let mut normal = [[0.0; 9]; 8];
-    for Sample { new, old, weight } in samples {
-        let [x, y] = *old;
-        let equations = [
-            [x, y, 1.0, 0.0, 0.0, 0.0, -x * new[0], -y * new[0], new[0]],
-            [0.0, 0.0, 0.0, x, y, 1.0, -x * new[1], -y * new[1], new[1]],
-        ];
-        for equation in equations {
-            for (row, a) in normal.iter_mut().zip(equation) {
-                for (sum, b) in row.iter_mut().zip(equation) {
-                    *sum += weight * a * b;
-                }
+    for (held, sums) in HELD.iter().zip(sums) {
+        for (row, sums) in held.iter().zip(sums) {
+            for (column, sum) in held.iter().zip(sums) {
+                normal[*row][*column] += sum;
             }
         }
     }
@@ -140,6 +141,25 @@ fn solve(samples: &[Sample]) -> Option<DMat3> {
         DVec3::new(h[2], h[5], 1.0),
     );
     (matrix.is_finite() && matrix.determinant() > 1e-3).then_some(matrix)
+}
+
+/// Sums of the products of what [`HELD`] names, the right side times the unknowns alone, for the
+/// equations of either axis.
+#[inline(always)]
+fn normal_sums(samples: &[Sample]) -> [[[f64; 6]; 5]; 2] {
+    let mut sums = [[[0.0; 6]; 5]; 2];
+    for Sample { new, old: [x, y], weight } in samples {
+        for (sums, new) in sums.iter_mut().zip(new) {
+            let equation = [*x, *y, 1.0, -x * new, -y * new, *new];
+            for (row, a) in sums.iter_mut().zip(equation) {
+                let a = weight * a;
+                for (sum, b) in row.iter_mut().zip(equation) {
+                    *sum += a * b;
+                }
+            }
+        }
+    }
+    sums
 }
 
 /// Gauss with row exchanges. None where the equations leave an unknown open.

@@ -9,6 +9,8 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::ThreadPool;
+use rayon::iter::ParallelIterator;
+use rayon::slice::ParallelSlice;
 
 use super::camera_path::{CameraOrder, CameraPath, Pose};
 use super::dilate_motion::dilate_cells;
@@ -16,7 +18,7 @@ use super::fill::{Filling, Run};
 use super::flow::Flow;
 use super::global::Homography;
 use super::grid::Grid;
-use super::lattice::{STRIDE, middle};
+use super::lattice::{Lattice, STRIDE, middle};
 use super::models::Models;
 use super::quadratic::Quadratic;
 use super::rung::Rung;
@@ -31,6 +33,8 @@ use crate::time::MonoTime;
 
 /// Cells of which one look tells whether any of them moves.
 const STILL_RUN: usize = 256;
+/// Cells that are worth waking a thread for.
+const STILL_PART: usize = 1 << 16;
 
 /// Who says which rung a cell takes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -130,18 +134,24 @@ impl Ladder {
             self.evidence.cut();
             return;
         }
-        self.is_still = is_still(key);
-        let mut models = self.prepare(pool, key);
-        if !matches!(self.choice, Choice::Always(_)) {
-            let followed = older.filter(|older| key.motion_from == Some(older.content_time));
-            let is_evidence = self.choice == Choice::Evidence;
-            let looked = flow.zip(followed).filter(|_| is_evidence);
+        self.is_still = is_still(pool, key);
+        let mut models = self.prepare(key);
+        let followed = older.filter(|older| key.motion_from == Some(older.content_time));
+        let mut looked = flow.zip(followed).filter(|_| self.choice == Choice::Evidence);
+        let may_rest = self.is_still && self.late.is_none();
+        let rested = may_rest && self.evidence.is_at_rest();
+        let stays = looked.as_mut().filter(|_| rested);
+        let stays = stays.is_some_and(|(flow, older)| flow.shows_the_same(pool, key, older));
+        models.lacks_lattice = stays && self.evidence.rest(Lattice::points_on(&models.grid));
+        if !models.lacks_lattice {
+            models.lattice.update(pool, key, &models.grid);
+        }
+        if !models.lacks_lattice && !matches!(self.choice, Choice::Always(_)) {
             let is_explained = looked.is_some_and(|(flow, older)| {
                 flow.find_failed(pool, key, older, &mut models.failed)
             });
-            let points = models.lattice.points();
-            let rests = self.is_still && self.late.is_none() && is_explained;
-            if !rests || !self.evidence.rest(points) {
+            let rests = may_rest && is_explained;
+            if !rests || !self.evidence.rest(models.lattice.points()) {
                 self.weigh(pool, key, &models, followed, before);
             }
         }
@@ -207,6 +217,10 @@ impl Ladder {
         let older = older.filter(|older| !older.displacement.data().is_empty());
         let quadratic = older.zip(before).and_then(|(older, before)| Quadratic::new(older, before));
         let models = &mut self.models;
+        if let Some(older) = older.filter(|_| models.lacks_lattice) {
+            models.lattice.update(pool, older, &models.grid);
+            models.lacks_lattice = false;
+        }
         let mut predictions = older.and_then(|older| {
             let after = (key.content_time - older.content_time).as_secs_f64();
             let phase = (after / older.motion_span()?.as_secs_f64()) as f32;
@@ -221,13 +235,12 @@ impl Ladder {
         self.evidence.update(pool, key, new, predictions.as_mut(), is_still, orders_alone);
     }
 
-    /// Works out what the rungs need of `key`, but for the affine maps.
-    fn prepare(&mut self, pool: &ThreadPool, key: &KeyFrame) -> Models {
+    /// Works out what the rungs need of `key`, but for the lattice and what is fitted to it.
+    fn prepare(&mut self, key: &KeyFrame) -> Models {
         // Their buffers go round: those of the key before last are taken over.
         let mut models = std::mem::take(&mut self.spare);
         models.grid = Grid::of(key);
-        models.lattice.update(pool, key, &models.grid);
-        models.affine.clear(&models.lattice);
+        models.affine.clear(Lattice::points_on(&models.grid));
         models.failed.clear();
         let uses_global = match self.choice {
             Choice::Always(rung) => rung == Rung::Global,
@@ -245,6 +258,7 @@ impl Ladder {
     fn fit_affine(&self, pool: &ThreadPool, models: &mut Models) {
         match self.choice {
             Choice::Always(Rung::Affine) => models.fit_affine(pool, |_, _| true),
+            Choice::Evidence if !self.evidence.takes(Rung::Affine) => {}
             Choice::Evidence => {
                 let evidence = &self.evidence;
                 let last = models.lattice.points().map(|points| points - 1);
@@ -342,10 +356,13 @@ impl Ladder {
 }
 
 /// Whether the motion of `key`, as it was decoded, is zero everywhere.
-fn is_still(key: &KeyFrame) -> bool {
+fn is_still(pool: &ThreadPool, key: &KeyFrame) -> bool {
     let is_decoded = key.velocity.data().len() == key.displacement.data().len();
     let moves = |run: &[Velocity]| run.iter().fold(0, |any, v| any | v.x | v.y) != 0;
-    is_decoded && !key.velocity.data().chunks(STILL_RUN).any(moves)
+    let moves = |part: &[Velocity]| part.chunks(STILL_RUN).any(moves);
+    // Where something moves, most often the first cells say so.
+    let (first, rest) = key.velocity.data().split_at(key.velocity.data().len().min(STILL_PART));
+    is_decoded && !moves(first) && !pool.install(|| rest.par_chunks(STILL_PART).any(moves))
 }
 
 /// Fills in a row, sample by sample: runs of samples that share a rung, and cells of others, which

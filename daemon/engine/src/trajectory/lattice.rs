@@ -6,7 +6,6 @@
 use rayon::ThreadPool;
 
 use super::grid::Grid;
-use super::surface::is_same_surface;
 use crate::bands::for_each_row;
 use crate::key::KeyFrame;
 use crate::lanes::{LANES, Lanes, Mask};
@@ -15,7 +14,7 @@ use crate::plane::Plane;
 /// Cells from one lattice point to the next, per axis.
 pub const STRIDE: u32 = 4;
 /// Lattice points that a window may reach beyond the border.
-pub(super) const MARGIN: usize = 2;
+pub(crate) const MARGIN: usize = 2;
 
 /// The lattice of one key.
 #[derive(Clone, Debug, Default)]
@@ -32,9 +31,9 @@ pub struct Lattice {
 
 /// Eight lattice points of a row.
 #[derive(Clone, Copy)]
-pub(super) struct Eight {
-    pub(super) d: [Lanes; 2],
-    pub(super) depth: [u32; LANES],
+pub(crate) struct Eight {
+    pub(crate) d: [Lanes; 2],
+    pub(crate) depth: [u32; LANES],
 }
 
 impl Eight {
@@ -44,16 +43,6 @@ impl Eight {
         let mut mask = [false; LANES];
         for ((mask, right), down) in mask.iter_mut().zip(self.d[0].0).zip(self.d[1].0) {
             *mask = right.is_finite() & down.is_finite();
-        }
-        mask
-    }
-
-    /// Which may be of one surface with those of `other`.
-    #[inline(always)]
-    pub(super) fn is_on(&self, other: &Self) -> Mask {
-        let mut mask = [false; LANES];
-        for ((mask, a), b) in mask.iter_mut().zip(self.depth).zip(other.depth) {
-            *mask = is_same_surface(a, b);
         }
         mask
     }
@@ -67,9 +56,15 @@ pub fn middle(point: u32, cells: u32) -> u32 {
 }
 
 impl Lattice {
+    /// Columns and rows of lattice points on a grid.
+    #[must_use]
+    pub fn points_on(grid: &Grid) -> [u32; 2] {
+        grid.cells.map(|cells| cells.div_ceil(STRIDE))
+    }
+
     /// Takes the field of `key`, whose cells lie on `grid`. Without depth all of it is one surface.
     pub fn update(&mut self, pool: &ThreadPool, key: &KeyFrame, grid: &Grid) {
-        self.points = grid.cells.map(|cells| cells.div_ceil(STRIDE));
+        self.points = Self::points_on(grid);
         let [columns, rows] = self.points;
         self.stride = (columns as usize).next_multiple_of(LANES) + 2 * MARGIN;
         let width = u32::try_from(3 * self.stride).expect("a quarter of 8192 columns, thrice");
@@ -137,7 +132,7 @@ impl Lattice {
 
     /// Those from a column on, counted with the margin as the row is.
     #[inline(always)]
-    pub(super) fn eight(&self, row: usize, column: usize) -> Eight {
+    pub(crate) fn eight(&self, row: usize, column: usize) -> Eight {
         let words = self.rows.row(row as u32);
         let run = |i: usize| {
             words[i * self.stride + column..]
@@ -150,13 +145,13 @@ impl Lattice {
 
     /// Where eight columns lie, counted with the margin.
     #[inline(always)]
-    pub(super) fn columns(&self, column: usize) -> Lanes {
+    pub(crate) fn columns(&self, column: usize) -> Lanes {
         Lanes(*self.x[column..].first_chunk().expect("rows have a margin on the right"))
     }
 
     /// Where a row lies, counted with the margin.
     #[inline(always)]
-    pub(super) fn row(&self, row: usize) -> f32 {
+    pub(crate) fn row(&self, row: usize) -> f32 {
         self.y[row]
     }
 }

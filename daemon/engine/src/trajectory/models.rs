@@ -22,6 +22,8 @@ use crate::key::KeyFrame;
 pub struct Models {
     pub(super) grid: Grid,
     pub(super) lattice: Lattice,
+    /// Whether the lattice is not of this key: it was not needed, as nothing moves.
+    pub(super) lacks_lattice: bool,
     pub(super) global: Option<Homography>,
     pub(super) affine: AffineField,
     /// By [`CameraOrder`].

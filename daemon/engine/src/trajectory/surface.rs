@@ -14,6 +14,24 @@ pub fn is_same_surface(a: u32, b: u32) -> bool {
     a.abs_diff(b) <= (a.max(b) >> DEPTH_TOLERANCE_SHIFT) + 1
 }
 
+/// [`Around::nearest`] of the cells around `position` (pixels): most often it is the nearest of all,
+/// which one look tells. None outside the picture.
+#[must_use]
+#[inline(always)]
+pub fn nearest_cell(
+    key: &KeyFrame,
+    grid: &Grid,
+    position: [f32; 2],
+    depth: Option<u32>,
+) -> Option<(u32, u32)> {
+    let place = grid.place(position);
+    let (x, y) = (nearest(place[0], grid.cells[0])?, nearest(place[1], grid.cells[1])?);
+    if is_on(key, x, y, depth) {
+        return Some((x, y));
+    }
+    Around::new(grid, position)?.nearest(key, depth)
+}
+
 /// The 2x2 cells around a place with their weights.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Around {
@@ -68,6 +86,18 @@ fn is_on(key: &KeyFrame, x: u32, y: u32, depth: Option<u32>) -> bool {
         Some(depth) if !key.depth.data().is_empty() => is_same_surface(depth, key.depth.at(x, y)),
         _ => true,
     }
+}
+
+/// The cell nearest to a place along one axis, the first of two. None where [`axis`] has none.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "clamped to the grid")]
+#[expect(clippy::cast_sign_loss, reason = "clamped to the grid")]
+#[expect(clippy::cast_precision_loss, reason = "cells up to 8192 are exact")]
+fn nearest(place: f32, cells: u32) -> Option<u32> {
+    if !(-0.5..=cells as f32 - 0.5).contains(&place) {
+        return None;
+    }
+    Some((place.clamp(0.0, (cells - 1) as f32) - 0.5).ceil() as u32)
 }
 
 /// The two cells around a place along one axis, with their weights. None outside the picture, which

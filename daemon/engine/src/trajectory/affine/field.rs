@@ -27,9 +27,8 @@ pub struct AffineField {
 }
 
 impl AffineField {
-    /// Forgets all fits: a key with this lattice is to come.
-    pub fn clear(&mut self, lattice: &Lattice) {
-        let [columns, rows] = lattice.points();
+    /// Forgets all fits: a key with so many columns and rows of lattice points is to come.
+    pub fn clear(&mut self, [columns, rows]: [u32; 2]) {
         self.columns = columns;
         let runs = columns.div_ceil(LANES as u32);
         self.fits.resize(runs, rows);

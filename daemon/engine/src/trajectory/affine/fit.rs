@@ -14,6 +14,7 @@
 use super::power::{Matrix, Power};
 use crate::lanes::{LANES, Lanes, both};
 use crate::trajectory::lattice::{Lattice, MARGIN};
+use crate::trajectory::surface::is_same_surface;
 
 /// Points of a window per axis.
 const SIDE: usize = 2 * MARGIN + 1;
@@ -127,13 +128,15 @@ impl Window {
         }
         for (i, (on, d)) in window.on.iter_mut().zip(&mut window.d).enumerate() {
             let cells = lattice.eight(row + i / SIDE, column + i % SIDE);
-            let (is_known, is_on) = (cells.is_known(), cells.is_on(&middle));
-            let mut counts = [false; LANES];
-            for ((counts, is_known), is_on) in counts.iter_mut().zip(is_known).zip(is_on) {
-                *counts = is_known & is_on;
+            for lane in 0..LANES {
+                let (right, down) = (cells.d[0].0[lane], cells.d[1].0[lane]);
+                let counts = right.is_finite()
+                    & down.is_finite()
+                    & is_same_surface(cells.depth[lane], middle.depth[lane]);
+                on.0[lane] = if counts { 1.0 } else { 0.0 };
+                d[0].0[lane] = if counts { right } else { 0.0 };
+                d[1].0[lane] = if counts { down } else { 0.0 };
             }
-            *on = Lanes::all(1.0).or(&counts, zero);
-            *d = [cells.d[0].or(&counts, zero), cells.d[1].or(&counts, zero)];
         }
         window
     }

@@ -37,7 +37,7 @@ fn disc(angle: f32, zoom: f32) -> KeyFrame {
 fn fitted(threads: usize, key: &KeyFrame, grid: &Grid) -> AffineField {
     let (mut lattice, mut field) = (Lattice::default(), AffineField::default());
     lattice.update(&pool(threads), key, grid);
-    field.clear(&lattice);
+    field.clear(lattice.points());
     field.fit(&pool(threads), &lattice, grid, |_, _| true);
     field
 }

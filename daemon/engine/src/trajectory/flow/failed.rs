@@ -1,8 +1,10 @@
 //! Where a key's own motion does not explain its picture, and flow does.
 //!
 //! A block of the key is looked at by the motion of the cells at its centre and near its corners
-//! first: most are explained by one of them. What is not is doubted. Where a block near it was
-//! doubted in the key before, it is looked at pixel by pixel ([`super::own`]), by the motion of
+//! first: most are explained by one of them. What is not is doubted. Every other row of blocks is
+//! looked at in turn, and what lies near blocks that were doubted in the key before; all of them
+//! where nothing is known of that. Where one was,
+//! a doubted block is looked at pixel by pixel ([`super::own`]), by the motion of
 //! each and but for those that were hidden before, as outlines may run through it. A picture that
 //! is another all of a sudden, as at a cut, so costs no search:
 //!
@@ -16,16 +18,19 @@
 //!
 //! What is left out is nothing that moves as a whole: of it nothing is said.
 
+use std::ops::Range;
+
 use rayon::ThreadPool;
 
 use super::believe::NOISE;
-use super::block::{contrast, sad, sad_in_any_light};
+use super::block::{contrast, sad, sad_between, sad_in_any_light};
 use super::luma::Level;
-use super::own::Own;
+use super::own::{Own, SIDE};
 use super::search::Search;
 use super::subpixel::{error_of, refine};
 use super::{BLOCK, PER_PX, Step};
 use crate::bands::for_each_chunk;
+use crate::lanes::both;
 use crate::plane::{Plane, Rect};
 use crate::time::MonoTime;
 
@@ -80,6 +85,8 @@ pub(super) struct Failing {
     /// The blocks that are doubted, and those of the key before.
     doubted: Plane<bool>,
     doubted_before: Plane<bool>,
+    /// Which rows of blocks it is the turn of.
+    turn: u32,
     /// Of which key `doubted` is.
     doubted_of: Option<MonoTime>,
     /// The blocks of each level that are searched, the finest first.
@@ -111,14 +118,21 @@ impl Failing {
         let knows_before = self.doubted_of.replace(times[0]) == Some(times[1])
             && [self.doubted_before.width(), self.doubted_before.height()] == [columns, rows];
         self.doubted.resize(columns, rows);
+        self.turn ^= 1;
+        let (before, turn) = (&self.doubted_before, self.turn);
         for_each_chunk(
             pool,
             self.doubted.data_mut(),
             columns as usize,
             #[inline(always)]
             |y, row| {
-                for (x, mark) in (0..).zip(row) {
-                    *mark = is_doubted(own, levels, [x, y]);
+                let is_its_turn = !knows_before || y % 2 == turn;
+                for (x, marks) in (0..).step_by(SIDE).zip(row.chunks_mut(SIDE)) {
+                    if !is_its_turn && !is_near(before, x..x + SIDE as u32, y) {
+                        marks.fill(false);
+                        continue;
+                    }
+                    mark_doubted(own, levels, [x, y], marks);
                 }
             },
         );
@@ -135,10 +149,9 @@ impl Failing {
             #[inline(always)]
             |y, row| {
                 for (x, mark) in (0..).zip(row) {
-                    let block = [x, y];
                     *mark = doubted.at(x, y)
-                        && is_near(before, block)
-                        && has_failed(own, levels, block);
+                        && is_near(before, x..x + 1, y)
+                        && has_failed(own, levels, [x, y]);
                 }
             },
         );
@@ -216,6 +229,9 @@ impl Failing {
                 }
             },
         );
+        if found.blocks.data().iter().all(|step| *step == NONE) {
+            found.clear();
+        }
     }
 }
 
@@ -241,13 +257,12 @@ fn has_company(explained: &Plane<Step>, [x, y]: [u32; 2]) -> bool {
     count > 2
 }
 
-/// Whether a marked block lies around `block`.
+/// Whether a marked block lies around those at columns `x` of row `y`.
 #[inline(always)]
-fn is_near(marks: &Plane<bool>, [x, y]: [u32; 2]) -> bool {
-    let last = [marks.width() - 1, marks.height() - 1];
-    let columns = x.saturating_sub(NEAR) as usize..=(x + NEAR).min(last[0]) as usize;
-    let mut rows = y.saturating_sub(NEAR)..=(y + NEAR).min(last[1]);
-    rows.any(|y| marks.row(y)[columns.clone()].contains(&true))
+fn is_near(marks: &Plane<bool>, x: Range<u32>, y: u32) -> bool {
+    let columns = x.start.saturating_sub(NEAR)..(x.end + NEAR).min(marks.width());
+    let mut rows = y.saturating_sub(NEAR)..(y + NEAR + 1).min(marks.height());
+    rows.any(|y| marks.row(y)[columns.start as usize..columns.end as usize].contains(&true))
 }
 
 /// (5), pixel by pixel.
@@ -257,24 +272,39 @@ fn has_failed(own: &Own<'_>, levels: [&Level; 2], block: [u32; 2]) -> bool {
     own.seen(levels, at).error > NOISE + contrast(levels[0], at) / 4
 }
 
-/// (5) by the motion of a few cells, to whole pixels.
+/// (5) by the motion of a few cells, of at most eight blocks from `block` on.
 #[inline(always)]
-fn is_doubted(own: &Own<'_>, [now, then]: [&Level; 2], block: [u32; 2]) -> bool {
-    let at = start(now, block);
-    let from = |d: [i32; 2]| {
-        let from = [0, 1].map(|axis| at[axis] - ((d[axis] + 128) >> 8));
-        then.has_block(from).then_some(from)
-    };
-    // Most blocks end here.
-    let centre = from(own.at_centre(at));
-    if centre.is_none_or(|from| sad(now, at, then, from) <= NOISE) {
-        return false;
+fn mark_doubted(own: &Own<'_>, levels: [&Level; 2], [x, y]: [u32; 2], marks: &mut [bool]) {
+    let mut at = [0; SIDE];
+    for (at, x) in at.iter_mut().zip(x..) {
+        *at = levels[0].start_of(x, 0);
     }
+    let row = levels[0].start_of(y, 1);
+    let [right, down] = own.at_centres(at, row);
+    let (mut centre, mut whole) = ([[0; 2]; SIDE], [[0; 2]; SIDE]);
+    for i in 0..SIDE {
+        centre[i] = [(at[i] << 8) - right[i], (row << 8) - down[i]];
+        whole[i] = [at[i] - ((right[i] + 128) >> 8), row - ((down[i] + 128) >> 8)];
+    }
+    for (i, mark) in marks.iter_mut().enumerate() {
+        let at = [at[i], row];
+        // Most blocks end here.
+        *mark = levels[1].has_block(whole[i])
+            && sad(levels[0], at, levels[1], whole[i]) > NOISE
+            && is_doubted(own, levels, at, centre[i]);
+    }
+}
+
+/// (5) of a block at `at` by the motion at its centre, which leads back to `centre` (Q8 pixels),
+/// and by that near its corners, to whole pixels.
+#[inline(always)]
+fn is_doubted(own: &Own<'_>, [now, then]: [&Level; 2], at: [i32; 2], centre: [i32; 2]) -> bool {
     let most = NOISE + contrast(now, at) / 4;
-    let fails = |from: Option<[i32; 2]>| {
-        from.is_some_and(|from| sad_in_any_light(now, at, then, from) > most)
+    let fails = |d: [i32; 2]| {
+        let from = both(|axis| at[axis] - ((d[axis] + 128) >> 8));
+        then.has_block(from) && sad_in_any_light(now, at, then, from) > most
     };
-    fails(centre) && own.near_corners(at).into_iter().all(|d| fails(from(d)))
+    sad_between(now, at, then, centre) > most && own.near_corners(at).into_iter().all(fails)
 }
 
 fn start(level: &Level, block: [u32; 2]) -> [i32; 2] {

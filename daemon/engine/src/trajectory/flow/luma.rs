@@ -54,20 +54,36 @@ impl Level {
         self.plane.row(y)[x..].first_chunk().expect("blocks stay within the margin")
     }
 
+    /// The rows of a block from (`x`, `y`) on, which lie within the margin.
+    #[inline(always)]
+    pub(super) fn block(&self, [x, y]: [i32; 2]) -> impl Iterator<Item = &[u8; BLOCK as usize]> {
+        let rows = self.plane.data()[self.index(x, y)..].chunks(self.plane.width() as usize);
+        rows.take(BLOCK as usize).map(|row| row.first_chunk().expect("a margin is that wide"))
+    }
+
+    /// Where (`x`, `y`) lies among all pixels.
+    #[inline(always)]
+    fn index(&self, x: i32, y: i32) -> usize {
+        let margin = MARGIN.cast_signed();
+        let (x, y) = ((x + margin).cast_unsigned(), (y + margin).cast_unsigned());
+        y as usize * self.plane.width() as usize + x as usize
+    }
+
     /// Luma in sixteenths at a place in Q8 pixels, between four; None outside the picture.
     #[inline(always)]
     pub(super) fn sample(&self, [x, y]: [i32; 2]) -> Option<i32> {
-        let is_in = |at: i32, axis: usize| (0..=(self.size[axis] - 1).cast_signed()).contains(&at);
         let (column, row) = (x >> 8, y >> 8);
-        if !is_in(column, 0) || !is_in(row, 1) {
+        if column.cast_unsigned() >= self.size[0] || row.cast_unsigned() >= self.size[1] {
             return None;
         }
         let (fx, fy) = (x & 0xff, y & 0xff);
-        let across = |row: i32| {
-            let [left, right] = *self.run::<2>(column, row);
-            i32::from(left) * (256 - fx) + i32::from(right) * fx
+        let start = self.index(column, row);
+        let across = |start: usize| {
+            let [left, right] = *self.plane.data()[start..].first_chunk()?;
+            Some(i32::from(left) * (256 - fx) + i32::from(right) * fx)
         };
-        Some(((across(row) >> 4) * (256 - fy) + (across(row + 1) >> 4) * fy) >> 8)
+        let (upper, lower) = (across(start)?, across(start + self.plane.width() as usize)?);
+        Some(((upper >> 4) * (256 - fy) + (lower >> 4) * fy) >> 8)
     }
 
     fn resize(&mut self, size: [u32; 2]) {

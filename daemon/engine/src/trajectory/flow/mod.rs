@@ -22,6 +22,7 @@ mod believe;
 mod block;
 mod cells;
 mod failed;
+mod glance;
 mod luma;
 mod own;
 mod search;
@@ -63,6 +64,8 @@ pub struct Flow {
     search: Search,
     cells: Cells,
     failing: Failing,
+    /// Keys that were glanced at.
+    glances: u32,
 }
 
 impl Flow {
@@ -86,7 +89,7 @@ impl Flow {
 
     /// Finds in `found` where the motion of `newest`, which points back to `older`, does not
     /// explain its picture, and what does. Little work where it does everywhere. Returns whether it
-    /// does: the pictures can be compared, and no block is doubted.
+    /// does: the pictures can be compared, and no block is doubted of those whose turn it was.
     pub fn find_failed(
         &mut self,
         pool: &ThreadPool,
@@ -112,15 +115,31 @@ impl Flow {
         false
     }
 
-    /// Has luma of both keys. Returns false where the two cannot be compared.
-    fn take_pictures(&mut self, pool: &ThreadPool, newest: &KeyFrame, older: &KeyFrame) -> bool {
+    /// Whether `newest`, in which nothing moves, shows what `older` did, as far as some rows of
+    /// blocks tell, in turn from key to key.
+    pub fn shows_the_same(
+        &mut self,
+        pool: &ThreadPool,
+        newest: &KeyFrame,
+        older: &KeyFrame,
+    ) -> bool {
+        self.glances = self.glances.wrapping_add(1);
+        Self::is_comparable(newest, older) && glance::is_same(pool, newest, older, self.glances)
+    }
+
+    /// Whether two keys can be compared.
+    fn is_comparable(newest: &KeyFrame, older: &KeyFrame) -> bool {
         let is_in = |key: &KeyFrame| key.valid.fits(key.color.width(), key.color.height());
         let is_alike = newest.valid == older.valid
             && newest.color.format() == older.color.format()
             && is_in(newest)
             && is_in(older);
-        let is_large = newest.valid.width.min(newest.valid.height) >= 2 * BLOCK;
-        if !is_alike || !is_large {
+        is_alike && newest.valid.width.min(newest.valid.height) >= 2 * BLOCK
+    }
+
+    /// Has luma of both keys. Returns false where the two cannot be compared.
+    fn take_pictures(&mut self, pool: &ThreadPool, newest: &KeyFrame, older: &KeyFrame) -> bool {
+        if !Self::is_comparable(newest, older) {
             (self.newest_of, self.older_of) = (None, None);
             return false;
         }

@@ -7,7 +7,8 @@ use crate::plane::{Plane, Rect};
 use crate::trajectory::grid::Grid;
 use crate::trajectory::surface::is_same_surface;
 
-const SIDE: usize = BLOCK as usize;
+/// Pixels of a block per axis, and blocks that are looked at together.
+pub(super) const SIDE: usize = BLOCK as usize;
 /// Pixels that count, row by row.
 pub(super) type Mask = [[bool; SIDE]; SIDE];
 /// Motion that is looked at, pixels: any beyond leads out of the largest picture.
@@ -45,11 +46,26 @@ impl<'a> Own<'a> {
         self.valid
     }
 
-    /// Motion at the centre of the block at `at`, Q8 pixels; 0 where none is known.
+    /// Motion at the centres of the blocks at columns `x` and row `y`, Q8 pixels, right and down;
+    /// 0 where none is known.
     #[inline(always)]
-    pub(super) fn at_centre(&self, [x, y]: [i32; 2]) -> [i32; 2] {
+    pub(super) fn at_centres(&self, x: [i32; SIDE], y: i32) -> [[i32; SIDE]; 2] {
         let middle = BLOCK.cast_signed() / 2;
-        self.motion_of(self.grid.nearest([x + middle, y + middle]))
+        let row = self.motion.row(self.grid.nearest_to(1, y + middle));
+        let mut across = x;
+        for x in &mut across {
+            *x += middle;
+        }
+        let columns = self.grid.nearest_each(0, across);
+        let mut found = [[0.0; SIDE]; 2];
+        for i in 0..SIDE {
+            [found[0][i], found[1][i]] = row[columns[i] as usize];
+        }
+        let mut steps = [[0; SIDE]; 2];
+        for i in 0..SIDE {
+            [steps[0][i], steps[1][i]] = q8([found[0][i], found[1][i]]);
+        }
+        steps
     }
 
     /// The same near its corners.
@@ -65,13 +81,20 @@ impl<'a> Own<'a> {
     pub(super) fn seen(&self, [now, then]: [&Level; 2], at: [i32; 2]) -> Seen {
         let mut mask = [[false; SIDE]; SIDE];
         let mut r = [[0; SIDE]; SIDE];
-        let across: [i32; SIDE] = std::array::from_fn(|i| at[0] + i as i32);
+        let mut across = [at[0]; SIDE];
+        for (i, x) in (0..).zip(&mut across) {
+            *x += i;
+        }
         let columns = self.grid.nearest_each(0, across);
         for (down, (mask, r)) in (at[1]..).zip(mask.iter_mut().zip(&mut r)) {
             let y = self.grid.nearest_to(1, down);
             let luma = now.run::<SIDE>(at[0], down);
             // Step by step for all pixels of the row, which suits wide registers.
-            let motion = columns.map(|x| self.motion.at(x, y));
+            let cells = self.motion.row(y);
+            let mut motion = [[0.0; 2]; SIDE];
+            for i in 0..SIDE {
+                motion[i] = cells[columns[i] as usize];
+            }
             let mut from = [[0; SIDE]; 2];
             for i in 0..SIDE {
                 let [dx, dy] = q8(motion[i]);
@@ -96,11 +119,20 @@ impl<'a> Own<'a> {
     #[inline(always)]
     fn were_seen(&self, columns: [u32; SIDE], y: u32, from: [[i32; SIDE]; 2]) -> [bool; SIDE] {
         let Some((depth, older, grid)) = &self.depths else { return [true; SIDE] };
-        let [xs, ys] = from.map(|from| from.map(|from| (from + 128) >> 8));
-        let (xs, ys) = (grid.nearest_each(0, xs), grid.nearest_each(1, ys));
-        let now = columns.map(|x| depth.at(x, y));
-        let then: [u32; SIDE] = std::array::from_fn(|i| older.at(xs[i], ys[i]));
-        std::array::from_fn(|i| is_same_surface(now[i], then[i]))
+        let mut pixels = from;
+        for from in pixels.as_flattened_mut() {
+            *from = (*from + 128) >> 8;
+        }
+        let (xs, ys) = (grid.nearest_each(0, pixels[0]), grid.nearest_each(1, pixels[1]));
+        let depth = depth.row(y);
+        let (mut now, mut then, mut were_seen) = ([0; SIDE], [0; SIDE], [false; SIDE]);
+        for i in 0..SIDE {
+            (now[i], then[i]) = (depth[columns[i] as usize], older.at(xs[i], ys[i]));
+        }
+        for i in 0..SIDE {
+            were_seen[i] = is_same_surface(now[i], then[i]);
+        }
+        were_seen
     }
 
     /// Motion of a cell, Q8 pixels; 0 where none is known.
@@ -179,10 +211,12 @@ impl Cells {
     fn nearest_each(&self, axis: usize, pixels: [i32; SIDE]) -> [u32; SIDE] {
         const TWO_TO_23: f32 = 8_388_608.0;
         let (first, step, last) = (self.first[axis], self.step[axis], self.last[axis] as f32);
-        pixels.map(|pixel| {
+        let mut cells = [0; SIDE];
+        for (cell, pixel) in cells.iter_mut().zip(pixels) {
             let place = (first + pixel as f32 * step).max(0.0).min(last).floor();
-            (place + TWO_TO_23).to_bits() - TWO_TO_23.to_bits()
-        })
+            *cell = (place + TWO_TO_23).to_bits() - TWO_TO_23.to_bits();
+        }
+        cells
     }
 
     #[inline(always)]
