@@ -42,7 +42,7 @@ pub struct Args {
     #[arg(long, value_name = "NAME")]
     pub monitor: Option<String>,
     /// Where several streams are shown: single, each in a window of its own, or side-by-side, all
-    /// in one, on Wayland with wp_viewporter and wl_subcompositor alone [default: single]
+    /// in one; Wayland needs wp_viewporter and wl_subcompositor for that [default: single]
     #[arg(long)]
     #[serde(default, deserialize_with = "from_name")]
     pub layout: Option<Layout>,

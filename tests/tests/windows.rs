@@ -8,11 +8,13 @@ use std::fs;
 use std::path::PathBuf;
 
 use compositors::{Compositor, Kind};
-use daemon_fixture::child::{BACKEND, ChildProcess, lavapipe, run_if_asked};
+use daemon_fixture::child::{BACKEND, ChildProcess, LAYOUT, lavapipe, run_if_asked};
 use daemon_fixture::{Client, KeySource, private_folder};
 use foreframe_engine::MonoSpan;
 use foreframe_protocol::{DaemonMessage, DestroyStream, Presented};
 use foreframed::clock;
+use foreframed::control::{Controller, Request, Response};
+use rustix::process::Signal;
 use tempfile::TempDir;
 
 const MONITOR: [u32; 2] = [640, 360];
@@ -36,14 +38,14 @@ struct Stage {
 
 impl Stage {
     fn set(kind: Kind, hz: u32) -> Option<Self> {
-        Self::set_with(kind, hz, None)
+        Self::set_with(kind, hz, &[])
     }
 
-    /// The same on a GPU adapter.
-    fn set_with(kind: Kind, hz: u32, backend: Option<&str>) -> Option<Self> {
+    /// The same with options, as a child has them.
+    fn set_with(kind: Kind, hz: u32, options: &[(&'static str, &str)]) -> Option<Self> {
         let mut compositor = Compositor::start(kind, MONITOR, hz)?;
-        let backend = backend.map(|name| (BACKEND, name.to_owned()));
-        compositor.environment.extend(backend);
+        let options = options.iter().map(|&(name, value)| (name, value.to_owned()));
+        compositor.environment.extend(options);
         let folder = private_folder();
         let [socket, log] = ["daemon.sock", "log"].map(|name| folder.path().join(name));
         let daemon = ChildProcess::daemon_with_windows(&socket, &compositor.environment, &log);
@@ -67,6 +69,24 @@ impl Stage {
             }));
         }
         shown
+    }
+
+    /// What the daemon says of how its only stream is drawn, once it has reported.
+    fn drawn_by(&mut self) -> String {
+        let socket = self.folder.path().join("daemon.sock");
+        let mut controller = Controller::connect(&socket).expect("the daemon listens");
+        let patience = clock::now() + PATIENCE;
+        loop {
+            assert!(clock::now() < patience, "no report: {}", self.log());
+            self.client.submit(&mut self.source, [9, 9, 9, 255]);
+            self.client.take_waiting();
+            let answer = controller.ask(&Request::Status).expect("the daemon answers");
+            let Response::Status(status) = answer else { panic!("{answer:?}") };
+            let [stream] = &status.streams[..] else { panic!("{status:?}") };
+            if !stream.drawn_by.is_empty() {
+                return stream.drawn_by.clone();
+            }
+        }
     }
 
     /// Submits keys until the daemon's log has this text.
@@ -108,6 +128,7 @@ fn on_mutter(hz: u32) {
     assert_told_by_the_display(&shown);
     let log = stage.log();
     assert!(log.contains("way=\"wl_shm: the CPU makes the pictures\""), "{log}");
+    assert_eq!(stage.drawn_by(), "wl_shm: the CPU makes the pictures");
     assert!(log.contains("pacing=\"presentation feedback\""), "{log}");
     assert!(!log.contains("another pacing"), "{log}");
     let interval = stage.client.expect("pacing", |message| match message {
@@ -159,15 +180,97 @@ fn on_x11_frames_are_paced_by_a_timer_and_that_is_said() {
     stage.show(40);
     let log = stage.log();
     assert!(log.contains("pacing=\"timer\""), "{log}");
+    assert_eq!(stage.drawn_by(), "softbuffer: the CPU makes the pictures");
     stage.strike();
+}
+
+/// What the newest statistics of the stream say, once they pass: [shown, dropped].
+fn count_until(stage: &mut Stage, is_enough: impl Fn([u64; 2]) -> bool) -> [u64; 2] {
+    let patience = clock::now() + PATIENCE;
+    let mut counts = [0; 2];
+    while !is_enough(counts) {
+        assert!(clock::now() < patience, "{counts:?}: {}", stage.log());
+        stage.client.submit(&mut stage.source, [200, 100, 50, 255]);
+        for message in stage.client.take_waiting() {
+            if let DaemonMessage::Statistics(it) = message {
+                counts = [it.real + it.synthesised, it.dropped];
+            }
+        }
+    }
+    counts
+}
+
+#[test]
+fn pictures_that_an_x_server_never_took_count_as_dropped() {
+    let Some(mut stage) = Stage::set(Kind::Xvfb, 60) else { return };
+    let [shown, dropped] = count_until(&mut stage, |[shown, _]| shown > 20);
+    stage.compositor.signal(Signal::STOP);
+    let asleep = count_until(&mut stage, |[_, it]| it > dropped + 60);
+    // Some were under way when it fell asleep, and what is newest may still be shown.
+    assert!(asleep[0] < shown + 60, "{shown} shown, {asleep:?} while nothing is");
+    stage.compositor.signal(Signal::CONT);
+    count_until(&mut stage, |[it, _]| it > asleep[0] + 60);
+    stage.strike();
+}
+
+/// Two streams on X11, each with another colour, and what the screen shows of them.
+fn side_by_side_on_x11(options: &[(&'static str, &str)], way: &str) {
+    const COLORS: [[u8; 4]; 2] = [[200, 100, 50, 255], [10, 60, 220, 255]];
+    /// In the middle of the left half, and of the right: without a window manager nobody makes the
+    /// window as large as the screen.
+    const MIDDLES: [[usize; 2]; 2] = [[80, 90], [240, 90]];
+    let options: Vec<_> = options.iter().copied().chain([(LAYOUT, "side-by-side")]).collect();
+    let Some(mut stage) = Stage::set_with(Kind::Xvfb, 60, &options) else { return };
+    let mut second = stage.client.open_stream(2, 320, 180);
+    let [left, right] = COLORS.map(|[red, green, blue, _]| [red, green, blue]);
+    let mut shown = [0, 0];
+    let patience = clock::now() + PATIENCE;
+    while shown.into_iter().min() < Some(20)
+        || MIDDLES.map(|at| stage.compositor.pixel(at)) != [left, right]
+    {
+        let seen = MIDDLES.map(|at| stage.compositor.pixel(at));
+        assert!(clock::now() < patience, "{shown:?} keys, {seen:?}: {}", stage.log());
+        stage.client.submit(&mut stage.source, COLORS[0]);
+        stage.client.submit(&mut second, COLORS[1]);
+        for message in stage.client.take_waiting() {
+            if let DaemonMessage::Presented(presented) = message {
+                shown[presented.stream as usize - 1] += 1;
+            }
+        }
+    }
+    // The one that is left gets all of the window, without a new key.
+    stage.client.send(DestroyStream { stream: 1 });
+    let patience = clock::now() + PATIENCE;
+    while stage.compositor.pixel(MIDDLES[0]) != right {
+        assert!(clock::now() < patience, "{:?}", stage.compositor.pixel(MIDDLES[0]));
+        stage.client.take_waiting();
+        std::thread::yield_now();
+    }
+    let log = stage.log();
+    assert_eq!(log.matches(way).count(), 2, "{log}");
+    assert!(!log.contains("each gets a window") && !log.contains("another way"), "{log}");
+    assert_eq!(log.matches("window opens").count(), 1, "{log}");
+}
+
+#[test]
+fn on_x11_streams_are_side_by_side_in_one_window() {
+    side_by_side_on_x11(&[], "way=\"softbuffer");
+}
+
+#[test]
+fn on_x11_surfaces_are_side_by_side_in_one_window() {
+    let Some(backend) = lavapipe() else { return };
+    side_by_side_on_x11(&[(BACKEND, backend)], "way=\"a surface of llvmpipe");
 }
 
 /// Shows keys through a surface, which stays the way.
 fn on_a_surface(kind: Kind, hz: u32, pacing: &str) {
     let Some(backend) = lavapipe() else { return };
-    let Some(mut stage) = Stage::set_with(kind, hz, Some(backend)) else { return };
+    let Some(mut stage) = Stage::set_with(kind, hz, &[(BACKEND, backend)]) else { return };
     stage.show_until_logged(&format!("pacing=\"{pacing}\""));
     stage.show(40);
+    let drawn_by = stage.drawn_by();
+    assert!(drawn_by.starts_with("a surface of llvmpipe"), "{drawn_by}");
     stage.strike();
     let log = stage.log();
     assert!(log.contains("way=\"a surface of llvmpipe"), "{log}");
@@ -197,7 +300,7 @@ fn on_x11_a_surface_is_paced_by_a_timer() {
 #[test]
 fn a_surface_that_loses_its_compositor_ends_the_window_and_nothing_else() {
     let Some(backend) = lavapipe() else { return };
-    let Some(mut stage) = Stage::set_with(Kind::Mutter, 60, Some(backend)) else { return };
+    let Some(mut stage) = Stage::set_with(Kind::Mutter, 60, &[(BACKEND, backend)]) else { return };
     stage.show(5);
     stage.compositor.kill();
     stage.show_until_logged("window closes");

@@ -34,6 +34,7 @@ fn child_process() {
     match std::env::var(PART).as_deref() {
         Ok("lose") => lose_the_device(),
         Ok("keep") => show_kept_pictures(),
+        Ok("again") => lose_the_surface(),
         _ => {}
     }
 }
@@ -271,6 +272,45 @@ fn a_device_that_is_lost_leaves_the_window_to_the_cpu() {
     }
     let (said, seen) = run("lose");
     assert!(said.contains("wl_shm: the GPU device was lost"), "{said}");
+    assert!(seen.iter().any(|it| it.middle == KEY_SEEN), "{seen:?}");
+}
+
+fn lose_the_surface() {
+    let format = StreamFormat::rgba8(64, 32);
+    let mut player = Player::new(format);
+    let mut frame = ColorPlane::new(format.color, 64, 32);
+    frame.as_mut_bytes().as_chunks_mut::<4>().0.fill([1, 2, 3, 255]);
+    player.show(|window, planned| window.present(planned, &frame));
+    for wait in ["250.000 ms", "1000.000 ms"] {
+        player.window.lose_surface();
+        player.show(|window, planned| window.present(planned, &frame));
+        println!("without: {wait}: {}", player.window.way());
+        let patience = clock::now() + PATIENCE;
+        while !player.window.takes_kept_pictures() {
+            assert!(clock::now() < patience, "no surface is made again");
+            player.show(|window, planned| window.present(planned, &frame));
+        }
+    }
+    frame.as_mut_bytes().as_chunks_mut::<4>().0.fill(KEY);
+    player.show(|window, planned| window.present(planned, &frame));
+    println!("again: {}", player.window.way());
+    std::process::exit(0);
+}
+
+#[test]
+fn a_surface_that_is_lost_is_made_again_and_the_cpu_draws_meanwhile() {
+    if lavapipe().is_none() {
+        return;
+    }
+    let (said, seen) = run("again");
+    let without: Vec<_> = said.lines().filter_map(|it| it.strip_prefix("without: ")).collect();
+    assert_eq!(without.len(), 2, "{said}");
+    for line in without {
+        let (wait, way) = line.split_once(": ").unwrap();
+        assert!(way.starts_with("wl_shm: expected an image of the surface"), "{said}");
+        assert!(way.ends_with(&format!("another is made after {wait}")), "{said}");
+    }
+    assert!(said.contains("again: a surface of llvmpipe"), "{said}");
     assert!(seen.iter().any(|it| it.middle == KEY_SEEN), "{seen:?}");
 }
 

@@ -97,7 +97,14 @@ pub struct Stages {
     pub taken_in: Spread,
     /// Waiting for the wake of the picture, and making it.
     pub made: Spread,
-    /// From there to its refresh.
+    /// Of that, waiting for the wake, so that the picture is shown when it is due.
+    #[serde(default)]
+    pub paced: Spread,
+    /// From the arrival until the picture was handed to the display; without a window, until it was
+    /// ready.
+    #[serde(default)]
+    pub handed_over: Spread,
+    /// From being ready to its refresh.
     pub until_shown: Spread,
     /// All of it.
     pub whole: Spread,

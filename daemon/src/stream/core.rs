@@ -63,7 +63,8 @@ pub struct StreamCore {
     engine: Engine,
     pacer: Pacer,
     display: Display,
-    /// Pictures that were handed to a display that will tell what became of them, oldest first.
+    /// Pictures that were handed to a display which may tell what became of them, oldest first. One
+    /// that is a timer tells of those alone that it never showed.
     under_way: VecDeque<(MonoTime, Counted)>,
     frame: ColorPlane,
     /// Whether pictures may stay on the GPU that makes them.
@@ -334,17 +335,13 @@ impl StreamCore {
         }
         // Ready early: the display still shows it at the refresh that it was planned for.
         let presented_at = plan.present_at;
-        match self.display {
-            Display::Timer(_) => {
-                self.pacer.on_presented(plan.present_at, presented_at, presented_at);
-            }
-            Display::Told => {
-                if self.under_way.len() == UNDER_WAY {
-                    self.under_way.pop_front();
-                }
-                self.under_way.push_back((plan.present_at, counted));
-            }
+        if let Display::Timer(_) = self.display {
+            self.pacer.on_presented(plan.present_at, presented_at, presented_at);
         }
+        if self.under_way.len() == UNDER_WAY {
+            self.under_way.pop_front();
+        }
+        self.under_way.push_back((plan.present_at, counted));
         match counted {
             Counted::New(FrameKind::Real) => self.counts.real += 1,
             Counted::New(FrameKind::Synthesised) => self.counts.synthesised += 1,
@@ -384,7 +381,7 @@ impl StreamCore {
         }
     }
 
-    /// A display that tells has told.
+    /// The display, or who draws for it, has told.
     pub fn on_told(&mut self, told: Told) {
         match told {
             Told::Presented { planned, presented_at, heard_at } => {
@@ -394,7 +391,10 @@ impl StreamCore {
             Told::Discarded { planned } => {
                 // Too late for finishing, which has shared out the light of pictures after it.
                 self.count_discarded(planned);
-                self.pacer.on_discarded(planned);
+                // A timer's pictures were on time when they were made, and no display was late.
+                if let Display::Told = self.display {
+                    self.pacer.on_discarded(planned);
+                }
             }
             Told::Mode(refresh_interval) => {
                 self.pacer.on_mode(refresh_interval, RefreshKind::Fixed);

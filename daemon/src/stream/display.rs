@@ -146,11 +146,17 @@ impl WindowDisplay {
                     let pacing = core.pacing();
                     info!(?why, ?pacing, "window closes");
                     core.leave_display(clock::now());
+                    if self.feedback == Feedback::Timer {
+                        self.settle_by_time(MonoTime::FAR_FUTURE);
+                    }
                     return false;
                 }
             }
         }
         let pacing = core.pacing();
+        if self.feedback == Feedback::Timer {
+            self.settle_by_time(clock::now() - pacing.refresh_interval);
+        }
         if pacing.is_rate_corrected != self.is_rate_corrected {
             self.is_rate_corrected = pacing.is_rate_corrected;
             let measured = pacing.refresh_interval;
@@ -161,9 +167,6 @@ impl WindowDisplay {
 
     /// The first picture of a key was handed over: its client hears of it when it is shown.
     pub(super) fn await_word_of(&mut self, presented: Presented) {
-        if self.feedback == Feedback::Timer {
-            return self.shown.push(presented);
-        }
         if self.awaited.len() == MOST_AWAITED {
             self.awaited.pop_front();
         }
@@ -173,6 +176,12 @@ impl WindowDisplay {
     /// What clients are to hear.
     pub(super) fn take_shown(&mut self) -> Vec<Presented> {
         std::mem::take(&mut self.shown)
+    }
+
+    /// Nothing tells of what is shown: what was due before `until`, a refresh ago, was.
+    fn settle_by_time(&mut self, until: MonoTime) {
+        let is_over = |one: &mut Presented| MonoTime::from_ns(one.present_at_ns) < until;
+        self.shown.extend(std::iter::from_fn(|| self.awaited.pop_front_if(is_over)));
     }
 
     fn settle(&mut self, told: Told) {

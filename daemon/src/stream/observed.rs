@@ -78,12 +78,27 @@ pub struct KeyInstants {
     pub taken_in_at: MonoTime,
 }
 
+/// The instants of the picture that first shows a key.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct PictureInstants {
+    /// Its wake had come.
+    pub begun_at: MonoTime,
+    /// It was made.
+    pub ready_at: MonoTime,
+    /// The display has it.
+    pub handed_over_at: MonoTime,
+    /// The refresh that shows it.
+    pub presented_at: MonoTime,
+}
+
 /// What was noticed so far.
 #[derive(Clone, Debug, Default)]
 pub struct Observed {
     waited: Recent,
     taken_in: Recent,
     made: Recent,
+    paced: Recent,
+    handed_over: Recent,
     until_shown: Recent,
     whole: Recent,
     synthesis: Recent,
@@ -93,11 +108,14 @@ pub struct Observed {
 }
 
 impl Observed {
-    /// A key is shown for the first time, by a picture that was ready at `ready_at`.
-    pub fn key_shown(&mut self, key: &KeyInstants, ready_at: MonoTime, presented_at: MonoTime) {
+    /// A key is shown for the first time, by this picture.
+    pub fn key_shown(&mut self, key: &KeyInstants, picture: &PictureInstants) {
+        let PictureInstants { begun_at, ready_at, handed_over_at, presented_at } = *picture;
         self.waited.add(key.latched_at - key.arrived_at);
         self.taken_in.add(key.taken_in_at - key.latched_at);
         self.made.add(ready_at - key.taken_in_at);
+        self.paced.add(begun_at - key.taken_in_at);
+        self.handed_over.add(handed_over_at - key.arrived_at);
         self.until_shown.add(presented_at - ready_at);
         self.whole.add(presented_at - key.arrived_at);
     }
@@ -119,6 +137,8 @@ impl Observed {
             waited: self.waited.spread(),
             taken_in: self.taken_in.spread(),
             made: self.made.spread(),
+            paced: self.paced.spread(),
+            handed_over: self.handed_over.spread(),
             until_shown: self.until_shown.spread(),
             whole: self.whole.spread(),
             synthesis: self.synthesis.spread(),
@@ -190,8 +210,11 @@ mod tests {
         let mut observed = Observed::default();
         let [arrived_at, latched_at, taken_in_at] = [100, 101, 104].map(at_ms);
         let key = KeyInstants { arrived_at, latched_at, taken_in_at };
-        observed.key_shown(&key, at_ms(110), at_ms(117));
+        let [begun_at, ready_at, handed_over_at, presented_at] = [107, 110, 112, 117].map(at_ms);
+        observed
+            .key_shown(&key, &PictureInstants { begun_at, ready_at, handed_over_at, presented_at });
         let stages = observed.stages();
+        assert_eq!((stages.paced.p50, stages.handed_over.p50), (3.0, 12.0));
         let parts = [stages.waited, stages.taken_in, stages.made, stages.until_shown];
         assert_eq!(parts.map(|part| part.p50), [1.0, 3.0, 6.0, 7.0]);
         assert!((parts.iter().map(|part| part.p50).sum::<f64>() - stages.whole.p50).abs() < 1e-9);

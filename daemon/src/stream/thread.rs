@@ -30,7 +30,7 @@ use super::display::WindowDisplay;
 use super::hints::Hints;
 use super::intake::Intake;
 use super::mailbox::{Mailbox, Submission, Taken, UiSubmission};
-use super::observed::{KeyInstants, Observed, alternation};
+use super::observed::{KeyInstants, Observed, PictureInstants, alternation};
 use super::{FromStream, StreamEvent};
 use crate::clock::{self, Alarm, Woken};
 use crate::control::StreamStatus;
@@ -332,6 +332,7 @@ impl StreamThread {
     }
 
     fn make_frame(&mut self, plan: &Plan) {
+        let begun_at = clock::now();
         self.owes_picture = false;
         if let Some(submission) = self.parts.mailbox.take_ui() {
             self.take_ui(&submission);
@@ -363,10 +364,16 @@ impl StreamThread {
                 if let Some(window) = &mut self.window {
                     window.show(plan, &frame, &mut self.core);
                 }
+                let handed_over_at = match self.window {
+                    Some(_) => clock::now(),
+                    None => ready_at,
+                };
                 if is_here {
                     self.deliver(&frame);
                 }
-                self.on_presented(&frame, ready_at);
+                let presented_at = frame.presented_at;
+                let picture = PictureInstants { begun_at, ready_at, handed_over_at, presented_at };
+                self.on_presented(&frame, &picture);
             }
         }
         if self.statistics_due_at <= plan.present_at {
@@ -448,11 +455,11 @@ impl StreamThread {
         }
     }
 
-    fn on_presented(&mut self, frame: &PresentedFrame, ready_at: MonoTime) {
+    fn on_presented(&mut self, frame: &PresentedFrame, picture: &PictureInstants) {
         self.add_work(frame.kind, frame.work);
         let phase_q12 = frame.phase.q12().unsigned_abs();
         if let Some(key) = self.unshown.take_if(|key| key.key_index == frame.key_index) {
-            self.observed.key_shown(&key.instants, ready_at, frame.presented_at);
+            self.observed.key_shown(&key.instants, picture);
             let presented = Presented {
                 stream: 0,
                 phase_q12,

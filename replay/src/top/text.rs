@@ -53,12 +53,14 @@ pub fn title(stream: &StreamStatus) -> String {
 
 /// The stages of latency by name.
 #[must_use]
-pub fn stages(stream: &StreamStatus) -> [(&'static str, Spread); 6] {
+pub fn stages(stream: &StreamStatus) -> [(&'static str, Spread); 8] {
     let latency = &stream.latency_ms;
     [
         ("waited", latency.waited),
         ("taken in", latency.taken_in),
         ("made", latency.made),
+        ("of that, paced", latency.paced),
+        ("handed over", latency.handed_over),
         ("until shown", latency.until_shown),
         ("key, in all", latency.whole),
         ("an in-between", latency.synthesis),

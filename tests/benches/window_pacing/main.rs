@@ -4,8 +4,11 @@
 //! late before the refresh as the daemon (late), and once while a daemon makes as many pictures for
 //! nobody on the processors that the compositor draws on (busy).
 //!
-//! `cargo bench -p foreframe-tests --bench window_pacing [-- SECONDS [COMPOSITOR[:HZ]...]]`. The
-//! application runs at 40 keys a second, 640x360, full screen; the first second is not counted.
+//! `cargo bench -p foreframe-tests --bench window_pacing [-- SECONDS [WxH] [COMPOSITOR[:HZ]...]]`.
+//! The application runs at 40 keys a second, 640x360 where nothing else is said, full screen; the
+//! first second is not counted. Below each row of the daemon: where the time of its last keys went,
+//! from the last byte submitted to the picture handed to the compositor, and to its refresh. `none`
+//! instead of a compositor: the same without one, up to the picture being ready.
 //! `FOREFRAME_KEEP_LOG=FILE` keeps the log of the last daemon.
 
 #[path = "../../tests/compositors/mod.rs"]
@@ -26,10 +29,14 @@ use foreframe_protocol::{
     CameraMotion, DaemonMessage, MotionConvention, MotionDirection, MotionFormat, MotionUnit,
     PlaneKind, Presented, StreamFormat, Submit,
 };
+use foreframe_replay::top::text;
 use foreframed::clock;
+use foreframed::control::{Controller, Request, Response, Spread};
 use record::{Record, Row};
 
 const SIZE: [u32; 2] = [640, 360];
+/// Columns and rows.
+type Size = [u32; 2];
 const KEYS_PER_S: i64 = 40;
 /// From the commit of the plain client that is late to the refresh that it is for: about what the
 /// daemon learns to leave.
@@ -40,16 +47,25 @@ fn main() {
     run_if_asked();
     let mut words = std::env::args().skip(1).filter(|word| !word.starts_with("--"));
     let seconds = words.next().map_or(10, |word| word.parse().expect("a number of seconds"));
-    let asked: Vec<String> = words.collect();
+    let mut asked: Vec<String> = words.collect();
+    let size = asked.first().and_then(|word| size(word));
+    if size.is_some() {
+        asked.remove(0);
+    }
+    let size = size.unwrap_or(SIZE);
     let asked = if asked.is_empty() { DEFAULT.map(str::to_owned).into() } else { asked };
     println!("{}", Row::HEAD);
     for name in asked {
         let (program, hz) = name.split_once(':').unwrap_or((&name, "60"));
+        let hz = hz.parse().expect("a rate in Hz");
+        if program == "none" {
+            println!("{name} foreframe\n{}", to_nobody(size, hz, seconds));
+            continue;
+        }
         let kinds = [Kind::Mutter, Kind::Weston, Kind::Sway];
         let kind = kinds.into_iter().find(|kind| kind.program() == program);
-        let kind = kind.expect("mutter, weston or sway");
-        let hz = hz.parse().expect("a rate in Hz");
-        let Some(compositor) = Compositor::start(kind, SIZE, hz) else { continue };
+        let kind = kind.expect("mutter, weston, sway or none");
+        let Some(compositor) = Compositor::start(kind, size, hz) else { continue };
         // Clients of the first second are not shown by some.
         clock::sleep_until(clock::now() + MonoSpan::from_ms(2_000));
         let socket = compositor.folder().join(
@@ -61,50 +77,86 @@ fn main() {
         );
         let interval = MonoSpan::from_hz(f64::from(hz));
         for (how, delay) in [("plain", MonoSpan::ZERO), ("plain, late", interval - LATE)] {
-            let record = fifo::run(&socket, SIZE, seconds, delay);
+            let record = fifo::run(&socket, size, seconds, delay);
             println!("{}", record.row(&format!("{name} {how}"), interval));
         }
-        let beside = beside_the_daemon(&socket, hz, seconds);
+        let beside = beside_the_daemon(&socket, size, hz, seconds);
         println!("{}", beside.row(&format!("{name} plain, busy"), interval));
-        let (record, keys) = through_the_daemon(&compositor, seconds);
+        let (record, keys, stages) = through_the_daemon(&compositor, size, seconds);
         println!(
             "{}{}",
             record.row(&format!("{name} foreframe"), interval),
             late_keys(&keys, interval)
         );
+        println!("{stages}");
     }
 }
 
 /// The plain client again, while a daemon makes as many pictures and shows them to nobody.
-fn beside_the_daemon(compositor: &Path, hz: u32, seconds: i64) -> Record {
+fn beside_the_daemon(compositor: &Path, size: Size, hz: u32, seconds: i64) -> Record {
     let folder = private_folder();
     let socket = folder.path().join("daemon.sock");
     let daemon = ChildProcess::daemon_without_windows(&socket, hz);
     let record = thread::scope(|scope| {
-        let plain = scope.spawn(|| fifo::run(compositor, SIZE, seconds, MonoSpan::ZERO));
-        submit_keys(&socket, seconds);
+        let plain = scope.spawn(|| fifo::run(compositor, size, seconds, MonoSpan::ZERO));
+        submit_keys(&socket, size, seconds);
         plain.join().expect("the plain client goes on")
     });
     drop(daemon);
     record
 }
 
-fn through_the_daemon(compositor: &Compositor, seconds: i64) -> (Record, Vec<Presented>) {
+/// Where the time of keys goes in a daemon that has the processors for itself: it shows nothing.
+fn to_nobody(size: Size, hz: u32, seconds: i64) -> String {
+    let folder = private_folder();
+    let socket = folder.path().join("daemon.sock");
+    let _daemon = ChildProcess::daemon_without_windows(&socket, hz);
+    submit_keys(&socket, size, seconds).1
+}
+
+fn through_the_daemon(
+    compositor: &Compositor,
+    size: Size,
+    seconds: i64,
+) -> (Record, Vec<Presented>, String) {
     let folder = private_folder();
     let [socket, log] = ["daemon.sock", "log"].map(|name| folder.path().join(name));
     let daemon = ChildProcess::daemon_with_windows(&socket, &compositor.environment, &log);
-    let keys = submit_keys(&socket, seconds);
+    let (keys, stages) = submit_keys(&socket, size, seconds);
     drop(daemon);
     if let Some(kept) = std::env::var_os("FOREFRAME_KEEP_LOG") {
         std::fs::copy(&log, kept).expect("the place that FOREFRAME_KEEP_LOG names can be written");
     }
-    (Record::of_log(&log), keys)
+    (Record::of_log(&log), keys, stages)
 }
 
-/// What an application does for so many seconds, and what it hears of its keys after the first one.
-fn submit_keys(socket: &Path, seconds: i64) -> Vec<Presented> {
+/// `WxH`.
+fn size(word: &str) -> Option<Size> {
+    let (width, height) = word.split_once('x')?;
+    Some([width.parse().ok()?, height.parse().ok()?])
+}
+
+/// Where the daemon says that the time of the last keys of its stream went.
+fn stages(socket: &Path) -> String {
+    let answer = Controller::connect(socket).and_then(|mut daemon| daemon.ask(&Request::Status));
+    let status = match answer.expect("the daemon answers") {
+        Response::Status(status) => status,
+        other => panic!("{other:?}"),
+    };
+    let stream = status.streams.first().expect("the stream goes on");
+    let spread = |(name, spread)| {
+        let Spread { p50, p95 } = spread;
+        format!("{name} {p50:.2} ({p95:.2})")
+    };
+    let stages = text::stages(stream).map(spread).join(", ");
+    format!("  stages, median ms (95 %): {stages}")
+}
+
+/// What an application does for so many seconds, what it hears of its keys after the first one, and
+/// where the time of the last ones went.
+fn submit_keys(socket: &Path, size: Size, seconds: i64) -> (Vec<Presented>, String) {
     let mut client = Client::connect(socket);
-    let [width, height] = SIZE;
+    let [width, height] = size;
     let format = StreamFormat {
         motion: Some(MotionConvention {
             format: MotionFormat::Rg16f,
@@ -134,7 +186,7 @@ fn submit_keys(socket: &Path, seconds: i64) -> Vec<Presented> {
             _ => None,
         }));
     }
-    keys
+    (keys, stages(socket))
 }
 
 /// How many keys were shown more than so many refreshes after they came.

@@ -108,8 +108,9 @@ impl Compositor {
             }
             Kind::Xvfb => {
                 let mut command = Command::new("Xvfb");
-                command.args(["-displayfd", "1", "-nolisten", "tcp", "-screen", "0"]);
-                command.arg(format!("{size}x24"));
+                command.args(["-displayfd", "1", "-nolisten", "tcp", "-br"]);
+                command.arg("-fbdir").arg(at);
+                command.args(["-screen", "0"]).arg(format!("{size}x24"));
                 command
             }
         };
@@ -163,6 +164,20 @@ impl Compositor {
             ("WAYLAND_DISPLAY", name.to_owned()),
             ("DISPLAY", String::new()),
         ])
+    }
+
+    /// Red, green and blue of the X server's screen at a point, from its memory in XWD format.
+    pub(crate) fn pixel(&self, [x, y]: [usize; 2]) -> [u8; 3] {
+        let screen = fs::read(self.folder.path().join("Xvfb_screen0")).unwrap();
+        let number = |index: usize| {
+            let field = screen[index * 4..].first_chunk().unwrap();
+            usize::try_from(u32::from_be_bytes(*field)).unwrap()
+        };
+        let [header_len, bits_per_pixel, row_len, colors] = [0, 11, 12, 19].map(number);
+        assert_eq!(bits_per_pixel, 32, "the screen is another than was asked for");
+        let at = header_len + colors * 12 + y * row_len + x * 4;
+        let [blue, green, red, _] = *screen[at..].first_chunk().unwrap();
+        [red, green, blue]
     }
 
     /// Ends it at once.

@@ -17,6 +17,7 @@
 mod easel;
 mod handle;
 mod host;
+mod pane;
 mod placement;
 mod shared;
 mod software;
@@ -53,8 +54,8 @@ pub enum Layout {
     /// Each in a window of its own.
     #[default]
     Single,
-    /// All in one window, in columns of the same width. It needs Wayland with `wp_viewporter` and
-    /// `wl_subcompositor`: elsewhere each gets a window.
+    /// All in one window, in columns of the same width. On Wayland it needs `wp_viewporter` and
+    /// `wl_subcompositor`: without these each gets a window.
     SideBySide,
 }
 

@@ -22,7 +22,7 @@ impl Column {
     pub(super) const WHOLE: Self = Self { index: 0, count: 1 };
 
     /// Where it begins in a window of this width, and its own width.
-    fn of(self, width: u32) -> [u32; 2] {
+    pub(super) fn of(self, width: u32) -> [u32; 2] {
         let at = |index: u32| {
             let at = u64::from(width) * u64::from(index) / u64::from(self.count.max(1));
             u32::try_from(at).unwrap_or(width)

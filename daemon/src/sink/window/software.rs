@@ -1,51 +1,56 @@
 //! Pictures for displays without Wayland: a thread scales and paints them.
 //!
-//! The stream leaves its picture on an [`Easel`] and goes on. Nothing tells when it was shown.
+//! The stream leaves its picture on an [`Easel`] and goes on. Nothing tells when it was shown; one
+//! that another replaced before the thread got to it never is, and that is told.
 
 use std::num::NonZeroU32;
 use std::sync::Arc;
 use std::thread;
 
-use foreframe_engine::{ColorPlane, Rect, StreamFormat};
+use foreframe_engine::{ColorPlane, MonoTime, Rect, StreamFormat};
 use softbuffer::{Context, SoftBufferError, Surface};
 use tracing::warn;
 use winit::event_loop::OwnedDisplayHandle;
-use winit::window::Window as DesktopWindow;
 
 use super::easel::Easel;
+use super::pane::Pane;
 use super::placement::Placement;
 use super::shared::Shared;
 use super::texels::{ByteOrder, Picture, Texels};
-use super::{Closed, WindowError};
+use super::{Closed, WindowError, WindowEvent};
+use crate::stream::core::Told;
 
 /// Paints a window. Its thread ends when this is dropped and the display lets it.
 #[derive(Debug)]
 pub(super) struct Painter {
-    easel: Arc<Easel<()>>,
+    easel: Arc<Easel<MonoTime>>,
+    shared: Arc<Shared>,
 }
 
 impl Painter {
     pub(super) fn start(
-        window: Arc<DesktopWindow>,
+        window: Pane,
         display: OwnedDisplayHandle,
         format: &StreamFormat,
         shared: Arc<Shared>,
     ) -> Result<Self, WindowError> {
         let easel = Arc::new(Easel::default());
         let (place, format) = (Arc::clone(&easel), *format);
+        let told = Arc::clone(&shared);
         thread::Builder::new().name("foreframe-painter".to_owned()).spawn(move || {
-            if let Err(error) = paint_all(window, display, &format, &place, &shared) {
+            if let Err(error) = paint_all(window, display, &format, &place, &told) {
                 warn!(%error, "the window cannot be painted");
-                shared.close(Closed::WithDisplay);
+                told.close(Closed::WithDisplay);
             }
         })?;
-        Ok(Self { easel })
+        Ok(Self { easel, shared })
     }
 
     /// Leaves `frame` for the painter.
-    pub(super) fn present(&self, frame: &ColorPlane) -> bool {
-        // Nobody waits for word of the picture that it may replace.
-        let _replaced = self.easel.leave((), frame);
+    pub(super) fn present(&self, planned: MonoTime, frame: &ColorPlane) -> bool {
+        if let Some(planned) = self.easel.leave(planned, frame) {
+            self.shared.tell(WindowEvent::Told(Told::Discarded { planned }));
+        }
         true
     }
 }
@@ -57,17 +62,17 @@ impl Drop for Painter {
 }
 
 fn paint_all(
-    window: Arc<DesktopWindow>,
+    window: Pane,
     display: OwnedDisplayHandle,
     format: &StreamFormat,
-    easel: &Easel<()>,
+    easel: &Easel<MonoTime>,
     shared: &Shared,
 ) -> Result<(), SoftBufferError> {
     let context = Context::new(display)?;
     let mut surface = Surface::new(&context, window)?;
     let mut texels = Texels::new(format, ByteOrder::Bgrx);
     let (mut painted, mut row) = (None, Vec::new());
-    while let Some(((), frame)) = easel.take(painted.take()) {
+    while let Some((_, frame)) = easel.take(painted.take()) {
         let placement = Placement::scaled([frame.width(), frame.height()], shared.size());
         let [width, height] =
             placement.buffer.map(|length| NonZeroU32::new(length).expect("a side is at least 1"));

@@ -22,10 +22,11 @@ use winit::event_loop::{
 };
 use winit::keyboard::{Key, NamedKey};
 use winit::monitor::MonitorHandle;
-use winit::platform::wayland::{ActiveEventLoopExtWayland as _, EventLoopBuilderExtWayland as _};
+use winit::platform::wayland::EventLoopBuilderExtWayland as _;
 use winit::window::{Fullscreen, Window as DesktopWindow, WindowAttributes, WindowId};
 
 use super::host::Host;
+use super::pane::Pane;
 use super::shared::Shared;
 use super::wayland::Role;
 use super::{Closed, Layout, WindowConfig, WindowError, WindowEvent, WindowOptions};
@@ -63,7 +64,11 @@ impl fmt::Debug for WindowOpener {
 /// A window as the desktop made it.
 #[derive(Debug)]
 pub(super) struct Opened {
+    /// What the window is closed by.
+    pub(super) host: WindowId,
     pub(super) window: Arc<DesktopWindow>,
+    /// What to draw on without Wayland.
+    pub(super) pane: Pane,
     pub(super) display: OwnedDisplayHandle,
     /// Announced refresh interval of its monitor.
     pub(super) refresh_interval: Option<MonoSpan>,
@@ -200,9 +205,9 @@ impl ApplicationHandler<Request> for Desktop {
             Request::Open(config, shared, reply) => {
                 let opened = self.open(display, &config, &shared);
                 if let Err(unwanted) = reply.send(opened)
-                    && let Ok(Opened { window, .. }) = unwanted.0
+                    && let Ok(Opened { host, .. }) = unwanted.0
                 {
-                    self.close(window.id(), &shared);
+                    self.close(host, &shared);
                 }
             }
             Request::Close(window, shared) => self.close(window, &shared),
@@ -211,7 +216,9 @@ impl ApplicationHandler<Request> for Desktop {
     }
 
     fn window_event(&mut self, _: &ActiveEventLoop, id: WindowId, event: DesktopEvent) {
-        let Some(host) = self.windows.get_mut(&id) else { return };
+        let Some(host) = self.windows.get_mut(&id) else {
+            return self.pane_event(id, &event);
+        };
         match event {
             DesktopEvent::CloseRequested => host.close(Closed::ByUser),
             DesktopEvent::Destroyed => host.close(Closed::WithDisplay),
@@ -248,32 +255,46 @@ impl ApplicationHandler<Request> for Desktop {
 }
 
 impl Desktop {
+    /// A window inside another has heard what is meant for that: whoever has the keyboard, keys are
+    /// for all.
+    fn pane_event(&self, id: WindowId, event: &DesktopEvent) {
+        if let DesktopEvent::KeyboardInput { event, is_synthetic: false, .. } = event
+            && let Some(host) = self.windows.values().find(|host| host.has_inside(id))
+        {
+            on_key(host, event);
+        }
+    }
+
     fn open(
         &mut self,
         display: &ActiveEventLoop,
         config: &WindowConfig,
         shared: &Arc<Shared>,
     ) -> Result<Opened, WindowError> {
-        let is_shared = self.shares_windows(display);
-        let host = match self.windows.values_mut().next().filter(|_| is_shared) {
-            Some(host) => host,
+        let is_shared = self.options.layout == Layout::SideBySide;
+        let open = self.windows.keys().next().copied().filter(|_| is_shared);
+        let id = match open {
+            Some(id) => id,
             None => self.open_host(display, config, is_shared)?,
         };
-        host.add(Arc::clone(shared), config.clone());
+        let host = self.windows.get_mut(&id).expect("it is open");
+        let pane = match host.add(display, Arc::clone(shared), config.clone()) {
+            Ok(pane) => pane,
+            Err(error) => {
+                if host.is_empty() {
+                    self.windows.remove(&id);
+                }
+                return Err(error);
+            }
+        };
         Ok(Opened {
+            host: id,
             window: Arc::clone(&host.window),
+            pane,
             display: display.owned_display_handle(),
             refresh_interval: host.refresh_interval,
             role: host.role(),
         })
-    }
-
-    /// Whether all streams are to be in one window, and can be as far as is known.
-    fn shares_windows(&mut self, display: &ActiveEventLoop) -> bool {
-        if self.options.layout == Layout::SideBySide && !display.is_wayland() {
-            self.leave_side_by_side("Wayland");
-        }
-        self.options.layout == Layout::SideBySide
     }
 
     fn leave_side_by_side(&mut self, lacking: &str) {
@@ -286,7 +307,7 @@ impl Desktop {
         display: &ActiveEventLoop,
         config: &WindowConfig,
         is_shared: bool,
-    ) -> Result<&mut Host, WindowError> {
+    ) -> Result<WindowId, WindowError> {
         let monitor = find_monitor(display, self.options.monitor.as_deref())?;
         let size = PhysicalSize::new(config.format.width, config.format.height);
         let title = if is_shared { SHARED_TITLE } else { &config.title };
@@ -307,10 +328,8 @@ impl Desktop {
             "window opens"
         );
         let id = window.id();
-        let several = is_shared.then(|| {
-            let display = display.owned_display_handle();
-            Host::for_several(Arc::clone(&window), &display, refresh_interval)
-        });
+        let several =
+            is_shared.then(|| Host::for_several(Arc::clone(&window), display, refresh_interval));
         let host = match several {
             None => Host::new(window, refresh_interval),
             Some(Err(WindowError::Lacks(lacking))) => {
@@ -320,7 +339,8 @@ impl Desktop {
             }
             Some(host) => host?,
         };
-        Ok(self.windows.entry(id).or_insert(host))
+        self.windows.insert(id, host);
+        Ok(id)
     }
 
     fn close(&mut self, window: WindowId, shared: &Arc<Shared>) {

@@ -376,3 +376,32 @@ fn a_picture_that_was_discarded_counts_when_it_is_shown_at_last() {
     let counts = rig.core.counts();
     assert_eq!((counts.real, counts.dropped), (1, 1));
 }
+
+#[test]
+fn on_a_timer_a_picture_that_was_never_shown_counts_as_dropped() {
+    for (method, kind) in
+        [(Method::Hold, FrameKind::Real), (Method::Linear, FrameKind::Synthesised)]
+    {
+        let mut rig = Rig::new(method);
+        rig.key(0);
+        rig.key(20);
+        let shown = loop {
+            match rig.make() {
+                FrameOutcome::Presented(frame) if frame.kind == kind => break frame,
+                _ => {}
+            }
+        };
+        let before = rig.core.counts();
+        let pacing = rig.core.pacing();
+        rig.core.on_told(Told::Discarded { planned: shown.present_at });
+        assert_eq!(rig.core.pacing(), pacing, "it was made in time");
+        let after = rig.core.counts();
+        let made = |counts: FrameCounts| counts.real + counts.synthesised;
+        assert_eq!((made(after) + 1, after.dropped), (made(before), before.dropped + 1));
+        // Said twice, or of a picture that nobody made, it changes nothing.
+        rig.core.on_told(Told::Discarded { planned: shown.present_at });
+        rig.core.on_told(Told::Discarded { planned: at_ms(-1) });
+        assert_eq!(rig.core.counts(), after);
+        assert!(rig.core.is_to_show_again(), "the display does not have it");
+    }
+}

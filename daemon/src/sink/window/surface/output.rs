@@ -60,7 +60,7 @@ impl Output {
                 gpu.instance().create_surface(wgpu::SurfaceTarget::from(target))
             }
             Canvas::Other { window, .. } => {
-                gpu.instance().create_surface(wgpu::SurfaceTarget::from(Arc::clone(window)))
+                gpu.instance().create_surface(wgpu::SurfaceTarget::from(window.clone()))
             }
         };
         let surface = made.map_err(|error| SurfaceError::Refused(error.to_string()))?;
