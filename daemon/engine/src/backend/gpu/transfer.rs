@@ -3,7 +3,7 @@
 //! [`Upload`] is filled by the CPU and copied on the device; it is mapped again as soon as that is
 //! done, so that the next key finds it ready. [`Download`] goes the other way.
 
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 use super::GpuError;
 use super::device::{Gpu, TIMEOUT};
@@ -27,29 +27,43 @@ impl Mapping {
     /// Asks for `buffer` to be mapped once the device is done with it.
     fn ask(&self, buffer: &wgpu::Buffer, mode: wgpu::MapMode) {
         self.reach(Reached::Pending);
-        let mapping = self.clone();
+        let word = Word(self.clone());
         buffer.map_async(mode, .., move |result| {
-            mapping.reach(if result.is_ok() { Reached::Ready } else { Reached::Failed });
+            word.0.reach(if result.is_ok() { Reached::Ready } else { Reached::Failed });
         });
     }
 
     fn reach(&self, reached: Reached) {
-        let (state, changed) = &*self.0;
-        *state.lock().unwrap_or_else(PoisonError::into_inner) = reached;
-        changed.notify_all();
+        *self.state() = reached;
+        self.0.1.notify_all();
+    }
+
+    fn state(&self) -> MutexGuard<'_, Reached> {
+        self.0.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn is_ready(&self) -> bool {
-        *self.0.0.lock().unwrap_or_else(PoisonError::into_inner) == Reached::Ready
+        *self.state() == Reached::Ready
     }
 
     /// Whether it is mapped, once that is known: the device is done.
     fn is_ready_at_last(&self) -> bool {
-        let (state, changed) = &*self.0;
-        let state = state.lock().unwrap_or_else(PoisonError::into_inner);
-        let waited =
-            changed.wait_timeout_while(state, TIMEOUT, |reached| *reached == Reached::Pending);
+        let is_pending = |reached: &mut Reached| *reached == Reached::Pending;
+        let waited = self.0.1.wait_timeout_while(self.state(), TIMEOUT, is_pending);
         *waited.unwrap_or_else(PoisonError::into_inner).0 == Reached::Ready
+    }
+}
+
+/// Owed by the device for a mapping that was asked for.
+struct Word(Mapping);
+
+impl Drop for Word {
+    /// wgpu maps what is ready and then drops the callbacks unheard where it refuses a surface its
+    /// size because somebody submits meanwhile. Whether it is mapped shows when it is read.
+    fn drop(&mut self) {
+        if *self.0.state() == Reached::Pending {
+            self.0.reach(Reached::Ready);
+        }
     }
 }
 
