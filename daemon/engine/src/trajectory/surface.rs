@@ -116,3 +116,32 @@ fn axis(place: f32, cells: u32) -> Option<[(u32, f32); 2]> {
     let way = clamped - low as f32;
     Some([(low, 1.0 - way), ((low + 1).min(last), way)])
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::plane::Rect;
+    use crate::testing::{hash, plane};
+
+    proptest! {
+        #[test]
+        fn one_look_finds_the_cell_that_four_looks_find(
+            cells in prop::array::uniform2(1_u32..9),
+            position in prop::array::uniform2(-3.0_f32..20.0),
+            depth in prop::option::of(prop::sample::select(vec![100_u32, 1000, 9000])),
+            seed: u32,
+        ) {
+            let depths = |x, y| [100, 1000, 9000][hash(x, y, seed) as usize % 3];
+            let key = KeyFrame {
+                valid: Rect { x: 1, y: 0, width: 2 * cells[0], height: 2 * cells[1] },
+                depth: plane(cells[0], cells[1], depths),
+                ..KeyFrame::default()
+            };
+            let grid = Grid::of(&key);
+            let slowly = Around::new(&grid, position).and_then(|it| it.nearest(&key, depth));
+            prop_assert_eq!(nearest_cell(&key, &grid, position, depth), slowly);
+        }
+    }
+}

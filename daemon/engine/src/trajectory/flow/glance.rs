@@ -38,6 +38,9 @@ pub(super) fn is_same(pool: &ThreadPool, newest: &KeyFrame, older: &KeyFrame, tu
 }
 
 fn is_same_in<T: Texel>(pool: &ThreadPool, planes: [&Plane<T>; 2], valid: Rect, turn: u32) -> bool {
+    if valid.width < BLOCK {
+        return false;
+    }
     // The last row of blocks reaches into the one before it where it is not whole.
     let Some(last) = valid.height.checked_sub(BLOCK) else { return false };
     let rows = (turn % ROWS..valid.height.div_ceil(BLOCK)).step_by(ROWS as usize);
@@ -66,7 +69,9 @@ fn is_same_in<T: Texel>(pool: &ThreadPool, planes: [&Plane<T>; 2], valid: Rect, 
 fn is_same_row<T: Texel>(planes: [&Plane<T>; 2], valid: Rect, first: u32) -> bool {
     let columns = valid.x as usize..(valid.x + valid.width) as usize;
     columns.clone().step_by(RUN).all(|start| {
-        let run = start..(start + RUN).min(columns.end);
+        let end = (start + RUN).min(columns.end);
+        // The last block of a row reaches into the one before it where it is not whole.
+        let run = end - (end - start).next_multiple_of(BLOCK as usize)..end;
         let mut sums = [0_u32; RUN / BLOCK as usize];
         for y in first..first + BLOCK {
             let [now, then] = planes.map(|plane| &plane.row(y)[run.clone()]);
@@ -118,7 +123,8 @@ mod tests {
             let change = |column: u32, y: u32| 9 * u32::from(block(column, x) && block(y, 5 + 88));
             assert_eq!(found(change), [11 % ROWS], "{x}");
         }
-        // The lowest rows of pixels, which fill no block.
+        // The lowest rows of pixels, which fill no block, and the columns at the right.
         assert_eq!(found(|_, y| 40 * u32::from(y > 152)), [149 / BLOCK % ROWS]);
+        assert_eq!(found(|x, y| 40 * u32::from(x > 196 && y < 13)), [0]);
     }
 }

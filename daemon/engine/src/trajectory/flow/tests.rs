@@ -221,3 +221,55 @@ fn motion_that_explains_the_picture_is_left_alone_in_any_light_and_at_outlines()
     let wrong = [second, third].map(|key| with_motion(key.clone(), |_, _| [-6.0, 0.0]));
     assert!(!failed([first, &wrong[0], &wrong[1]]).is_empty(), "wrong motion does not pass");
 }
+
+#[test]
+fn a_row_of_blocks_that_begins_to_fail_is_doubted_within_two_keys() {
+    for (row, since) in [(4, 2), (4, 3), (5, 2), (5, 3)] {
+        let shows = |key: i64| {
+            let at = 6.0 * (key - since).max(0) as f32;
+            move |x: f32, y: f32| smooth(if y as u32 / BLOCK == row { x - at } else { x }, y, 4)
+        };
+        let keys: Vec<_> = (0..since + 3)
+            .map(|key| with_motion(key_of(25 * key, [160, 120], shows(key)), |_, _| [0.0; 2]))
+            .collect();
+        let (mut flow, mut found) = (Flow::default(), FailedField::default());
+        let is_explained: Vec<_> = keys
+            .windows(2)
+            .map(|pair| flow.find_failed(&pool(2), &pair[1], &pair[0], &mut found))
+            .collect();
+        let (before, after) = is_explained.split_at(since as usize);
+        assert!(before.iter().all(|it| *it), "{row}, {since}: {before:?}");
+        assert!(after.contains(&false), "{row}, {since}");
+    }
+}
+
+proptest! {
+    #[test]
+    fn a_block_between_pixels_is_the_samples_of_its_pixels(
+        from in prop::array::uniform2(-1024_i32..(72 << 8)),
+        seed: u32,
+    ) {
+        use super::block::sad_between;
+        use super::own::{SIDE, in_any_light};
+        let pyramids = [0, 1].map(|of| {
+            let shows = |x: f32, y: f32| (hash(x as u32, y as u32, seed ^ of) % 255) as f32 / 255.0;
+            let mut luma = Pyramid::default();
+            luma.update(&pool(1), &key_of(0, [80, 64], shows));
+            luma
+        });
+        let [now, then] = pyramids.each_ref().map(Pyramid::finest);
+        let mut r = [[0; SIDE]; SIDE];
+        let mut is_inside = true;
+        for (y, r) in (0..).zip(&mut r) {
+            for (x, r) in (0..).zip(r) {
+                let was = then.sample([from[0] + (x << 8), from[1] + (y << 8)]);
+                is_inside &= was.is_some();
+                let is = now.sample([(16 + x) << 8, (24 + y) << 8]).expect("it lies inside");
+                *r = was.unwrap_or(0) - is;
+            }
+        }
+        prop_assume!(is_inside);
+        let of_samples = in_any_light(&r, &[[true; SIDE]; SIDE]);
+        prop_assert_eq!(sad_between(now, [16, 24], then, from), of_samples);
+    }
+}
