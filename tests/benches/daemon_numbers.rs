@@ -2,12 +2,14 @@
 //! second, a subscriber to 120 frames a second.
 //!
 //! Prints private memory with output pools, time from submit to the slot's return, processor share,
-//! and what became of the frames: `cargo bench -p foreframe-tests --bench daemon_numbers`.
+//! and what became of the frames; then how long keys that come about once a refresh, at changing
+//! places in it, take to be shown: `cargo bench -p foreframe-tests --bench daemon_numbers`.
 
 #[path = "../tests/daemon_fixture/mod.rs"]
 mod daemon_fixture;
 
 use std::fs;
+use std::path::PathBuf;
 use std::process::{Child, Command};
 
 use daemon_fixture::{Client, KeySource, private_folder};
@@ -35,18 +37,80 @@ fn main() {
     {
         measure(width, height, divisor);
     }
+    measure_keeping_up(640, 360);
 }
 
-fn measure(width: u32, height: u32, divisor: u32) {
-    let folder = private_folder();
+/// A daemon in a process of its own, and where it listens.
+fn start_daemon(folder: &tempfile::TempDir) -> (Child, PathBuf) {
     let socket = folder.path().join("daemon.sock");
-    let mut daemon = Command::new(std::env::current_exe().expect("this program has a path"))
+    let daemon = Command::new(std::env::current_exe().expect("this program has a path"))
         .env("FOREFRAME_BENCH_DAEMON", &socket)
         .spawn()
         .expect("a second process can be started");
     while !socket.exists() {
         clock::sleep_until(clock::now() + MonoSpan::from_ms(5));
     }
+    (daemon, socket)
+}
+
+/// Keys a little faster than the display's 120 Hz, so that they come at every place in a refresh,
+/// each up to 3 ms early or late.
+fn measure_keeping_up(width: u32, height: u32) {
+    const KEYS_PER_1000_S: i64 = 120_500;
+    let folder = private_folder();
+    let (mut daemon, socket) = start_daemon(&folder);
+    let mut client = Client::connect(&socket);
+    let mut source = client.open_stream_sized(1, format(width, height), 2);
+    fill_motion(&mut source);
+    let interval = MonoSpan::from_ns(1_000_000_000_000 / KEYS_PER_1000_S);
+    let mut due_at = clock::now();
+    let mut before: Option<Submit> = None;
+    let mut shown = Vec::new();
+    let keys = SECONDS * KEYS_PER_1000_S / 1000;
+    let mut random = 1_u64;
+    let mut newest = Statistics::default();
+    for _ in 0..keys {
+        due_at += interval;
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        let jitter = i64::try_from((random >> 33) % 6001).expect("it is small") - 3000;
+        clock::sleep_until(due_at + MonoSpan::from_ns(jitter * 1000));
+        let mut submit = source.fill([80, 120, 160, 255]);
+        submit.motion_from_ns = before.map(|before| before.content_time_ns);
+        client.send(submit);
+        client.expect_released(&submit);
+        before = Some(submit);
+        for message in client.take_waiting() {
+            match message {
+                DaemonMessage::Presented(it) => {
+                    let received_at = MonoTime::from_ns(it.received_at_ns);
+                    shown.push(MonoTime::from_ns(it.presented_at_ns) - received_at);
+                }
+                DaemonMessage::Statistics(statistics) => newest = statistics,
+                _ => {}
+            }
+        }
+    }
+    shown.sort_unstable();
+    let at = |percent: usize| shown[(shown.len() - 1) * percent / 100];
+    println!(
+        "{width}x{height}, keys at {} Hz for 120: {} of {keys} shown; received to presented p5 {}, \
+         p50 {}, p95 {}; {} synthesised, {} repeated, {} dropped",
+        KEYS_PER_1000_S as f64 / 1000.0,
+        shown.len(),
+        at(5),
+        at(50),
+        at(95),
+        newest.synthesised,
+        newest.repeated,
+        newest.dropped,
+    );
+    daemon.kill().expect("the daemon runs until now");
+    daemon.wait().expect("the daemon was killed");
+}
+
+fn measure(width: u32, height: u32, divisor: u32) {
+    let folder = private_folder();
+    let (mut daemon, socket) = start_daemon(&folder);
     let mut client = Client::connect(&socket);
     let mut source = client.open_stream_sized(1, format(width, height), divisor);
     fill_motion(&mut source);

@@ -44,6 +44,8 @@ use crate::sink::worker::SinkWorker;
 /// Refreshes in a row with nothing new to show, after which the thread waits for the next key
 /// alone. Easing ends well before.
 const REPEATS_BEFORE_IDLE: u32 = 120;
+/// By how much a wake may come late when a key is to be taken in just before a picture.
+const LATE_WAKE: MonoSpan = MonoSpan::from_us(250);
 /// Time between two reports of counts.
 const STATISTICS_INTERVAL: MonoSpan = MonoSpan::from_ms(250);
 /// Real-time priority, at the lower end: above every ordinary thread, below what drives devices.
@@ -207,8 +209,14 @@ impl StreamThread {
             let is_idle = plan.content_time.is_none() || is_settled;
             let wake_at = if is_idle { MonoTime::FAR_FUTURE } else { plan.wake_at };
             if self.owes_picture && !is_idle {
-                clock::sleep_until(wake_at);
-                self.make_frame(&plan);
+                // The newest key of those that come until then is what the picture shows.
+                let hears_until = wake_at - self.key_work - LATE_WAKE;
+                if clock::now() < hears_until {
+                    clock::sleep_until(hears_until);
+                } else {
+                    clock::sleep_until(wake_at);
+                    self.make_frame(&plan);
+                }
                 continue;
             }
             match alarm.wait(&mailbox.waker, wake_at) {
