@@ -1,7 +1,8 @@
 //! The thread of a stream: waits for keys and for the pacer's wakes, and carries things to and fro.
 //!
-//! Between two keys there is always a picture, so that keys that come faster than they can be
-//! worked off do not keep the display from changing; the mailbox keeps the newest meanwhile.
+//! A key is taken in when it comes, and once more the newest one just before the picture that is
+//! owed. That picture is put off by one refresh at most, so that keys that come faster than they
+//! can be worked off do not keep the display from changing; the mailbox keeps the newest meanwhile.
 //! Nothing here waits for anybody: sinks, recorder, subscribers and main loop are all behind queues
 //! or slots that can be full.
 
@@ -113,6 +114,9 @@ struct StreamThread {
     unshown: Option<Unshown>,
     /// Whether no picture was made since the newest key was taken in.
     owes_picture: bool,
+    /// The refresh that the owed picture was planned for first. Keys may be heard no longer than
+    /// for that one, or keys that cost more and more would put the picture off for ever.
+    owed_for: Option<MonoTime>,
     refused: u64,
     /// What is wrong with the client's motion. None until enough keys have moved to tell.
     suspicion: Option<String>,
@@ -169,6 +173,7 @@ impl StreamThread {
             intake: Intake::default(),
             unshown: None,
             owes_picture: false,
+            owed_for: None,
             refused: 0,
             suspicion: None,
             repeats_in_a_row: 0,
@@ -211,7 +216,8 @@ impl StreamThread {
             if self.owes_picture && !is_idle {
                 // The newest key of those that come until then is what the picture shows.
                 let hears_until = wake_at - self.key_work - LATE_WAKE;
-                if clock::now() < hears_until {
+                let owed_for = *self.owed_for.get_or_insert(plan.present_at);
+                if plan.present_at <= owed_for && clock::now() < hears_until {
                     clock::sleep_until(hears_until);
                 } else {
                     clock::sleep_until(wake_at);
@@ -342,6 +348,7 @@ impl StreamThread {
     fn make_frame(&mut self, plan: &Plan) {
         let begun_at = clock::now();
         self.owes_picture = false;
+        self.owed_for = None;
         if let Some(submission) = self.parts.mailbox.take_ui() {
             self.take_ui(&submission);
         }

@@ -25,8 +25,9 @@ enum Reached {
 
 impl Mapping {
     /// Asks for `buffer` to be mapped once the device is done with it.
-    fn ask(&self, buffer: &wgpu::Buffer, mode: wgpu::MapMode) {
-        self.reach(Reached::Pending);
+    fn ask(&mut self, buffer: &wgpu::Buffer, mode: wgpu::MapMode) {
+        // A state of its own: the word of an earlier mapping may still be dropped.
+        self.0 = Arc::default();
         let word = Word(self.clone());
         buffer.map_async(mode, .., move |result| {
             word.0.reach(if result.is_ok() { Reached::Ready } else { Reached::Failed });

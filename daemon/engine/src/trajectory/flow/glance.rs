@@ -38,8 +38,8 @@ pub(super) fn is_same(pool: &ThreadPool, newest: &KeyFrame, older: &KeyFrame, tu
 }
 
 fn is_same_in<T: Texel>(pool: &ThreadPool, planes: [&Plane<T>; 2], valid: Rect, turn: u32) -> bool {
-    if valid.width < BLOCK {
-        return false;
+    if valid.width < RUN as u32 && !valid.width.is_multiple_of(BLOCK) {
+        return false; // Too narrow for that; a search tells.
     }
     // The last row of blocks reaches into the one before it where it is not whole.
     let Some(last) = valid.height.checked_sub(BLOCK) else { return false };
@@ -108,6 +108,12 @@ mod tests {
             ..KeyFrame::default()
         };
         let (older, newest) = (key(&|_, _| 0), key(&change));
+        // However narrow: none of these may panic.
+        for width in [8, 16, 17, 100, 127, 128, 129] {
+            let valid = Rect { x: 0, y: 0, width, height: 16 };
+            let keys = [&newest, &older].map(|key| KeyFrame { valid, ..key.clone() });
+            is_same(&pool(1), &keys[0], &keys[1], 0);
+        }
         (0..ROWS).filter(|turn| !is_same(&pool(2), &newest, &older, *turn)).collect()
     }
 
