@@ -7,7 +7,7 @@
 //! [`ingest`] translates the protocol's words into the engine's, [`clock`] is the only reader of
 //! clocks, [`config`] says what was asked for, [`gpu`] what the machine has for it, and through
 //! [`control`] people see what runs and change it. A [`hud`], made with [`draw`], says it in the
-//! picture.
+//! picture. Programs keep their planes in [`huge_pages`].
 
 pub mod capture;
 pub mod clock;
@@ -16,6 +16,7 @@ pub mod control;
 pub mod draw;
 pub mod gpu;
 pub mod hud;
+pub mod huge_pages;
 pub mod ingest;
 pub mod profiles;
 pub mod recorder;

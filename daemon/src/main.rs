@@ -3,6 +3,10 @@
 use std::process::ExitCode;
 
 use clap::Parser;
+use foreframed::huge_pages::HugePages;
+
+#[global_allocator]
+static ALLOCATOR: HugePages = HugePages;
 
 /// Makes a 40-60 Hz application look like 120 Hz and more.
 #[derive(Parser, Debug)]

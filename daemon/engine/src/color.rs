@@ -355,7 +355,10 @@ impl ColorPlane {
             (Self::Rgba8(plane), ColorFormat::Rgba8) => plane.resize(width, height),
             (Self::Rgb10a2(plane), ColorFormat::Rgb10a2) => plane.resize(width, height),
             (Self::Rgba16f(plane), ColorFormat::Rgba16f) => plane.resize(width, height),
-            _ => *self = Self::new(format, width, height),
+            _ => {
+                *self = Self::new(format, 0, 0);
+                self.reset(format, width, height);
+            }
         }
     }
 

@@ -1,5 +1,11 @@
 //! Two-dimensional arrays and rectangles in pixels.
 
+use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
+
+/// A plane that has to find memory for so many bytes lets every thread of its pool find a part: the
+/// system hands out pages when they are first written to, each emptied first.
+const SHARED_BYTES: usize = 1 << 20;
+
 /// A row-major image without padding. `data.len() == width * height` holds always.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Plane<T> {
@@ -8,19 +14,28 @@ pub struct Plane<T> {
     data: Vec<T>,
 }
 
-impl<T: Copy + Default> Plane<T> {
+impl<T: Copy + Default + Send> Plane<T> {
     /// A plane of `width` x `height` pixels, all `T::default()`.
     #[must_use]
     pub fn new(width: u32, height: u32) -> Self {
         Self { width, height, data: vec![T::default(); width as usize * height as usize] }
     }
 
-    /// Changes the size, keeping the allocation where it is large enough. Contents become default
-    /// only where the plane grew: write every pixel before reading it.
+    /// Changes the size, keeping the allocation where it is large enough. What the pixels are then
+    /// is unspecified: write every pixel before reading it.
     pub fn resize(&mut self, width: u32, height: u32) {
         self.width = width;
         self.height = height;
-        self.data.resize(width as usize * height as usize, T::default());
+        let count = width as usize * height as usize;
+        let is_in_pool = rayon::current_thread_index().is_some();
+        if count > self.data.capacity() && count * size_of::<T>() >= SHARED_BYTES && is_in_pool {
+            let share = SHARED_BYTES / 4 / size_of::<T>();
+            self.data = Vec::new(); // first, so that there are never two
+            let pixels = (0..count).into_par_iter().with_min_len(share).map(|_| T::default());
+            pixels.collect_into_vec(&mut self.data);
+        } else {
+            self.data.resize(count, T::default());
+        }
     }
 
     /// Takes on the pixels and size of `other`, keeping the allocation where it is large enough.
@@ -115,5 +130,40 @@ impl Rect {
             && self.height > 0
             && right <= u64::from(width)
             && bottom <= u64::from(height)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plane_has_its_size_whoever_finds_its_memory() {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
+        let resized = |sizes: &[[u32; 2]]| {
+            let mut plane = Plane::<u32>::default();
+            sizes.iter().for_each(|&[width, height]| plane.resize(width, height));
+            plane
+        };
+        for sizes in
+            [&[[640, 409]][..], &[[641, 409]], &[[8, 8], [1280, 720]], &[[1280, 720], [7, 5]]]
+        {
+            let [width, height] = sizes[sizes.len() - 1];
+            let shared = pool.install(|| resized(sizes));
+            assert_eq!(shared, resized(sizes), "{sizes:?}");
+            assert_eq!((shared.width(), shared.height()), (width, height));
+            assert_eq!(shared.data().len(), width as usize * height as usize);
+        }
+    }
+
+    #[test]
+    fn a_plane_that_shrinks_keeps_its_memory_for_when_it_grows_again() {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+        let mut plane = Plane::<u32>::default();
+        pool.install(|| plane.resize(1280, 720));
+        let at = plane.data().as_ptr();
+        pool.install(|| plane.resize(64, 64));
+        pool.install(|| plane.resize(1280, 720));
+        assert_eq!(plane.data().as_ptr(), at);
     }
 }
