@@ -45,7 +45,7 @@ unsafe impl GlobalAlloc for HugePages {
         if !block.is_null() {
             // It is a wish: without it the block is the same, in small pages.
             // SAFETY: the range is the block's own, and this advice changes no byte of it.
-            let _ = unsafe { madvise(block.cast(), pages.size(), Advice::LinuxHugepage) };
+            unsafe { madvise(block.cast(), pages.size(), Advice::LinuxHugepage) }.ok();
         }
         block
     }

@@ -4,9 +4,9 @@
 //! and hears of everything else through [`StreamEvent`]s. The [`thread`] copies planes out of the
 //! pool ([`planes`]), drives the [`core`], and hands pictures to subscribers ([`outlet`]), to a
 //! sink, to the window ([`display`]) and key frames to the recorder. What it is told to do
-//! differently is a [`command`], what it notices about itself is [`observed`]. Whatever is slow to
-//! drop goes to the [`reaper`], and pools
-//! for subscribers come from the [`allocator`].
+//! differently is a [`command`], what it notices about itself is [`observed`]. A picture that no key
+//! can wait for longer is [`owed`]. Whatever is slow to drop goes to the [`reaper`], and pools for
+//! subscribers come from the [`allocator`].
 
 pub mod allocator;
 pub mod command;
@@ -17,6 +17,7 @@ mod intake;
 pub mod mailbox;
 pub mod observed;
 pub mod outlet;
+pub mod owed;
 pub mod planes;
 pub mod reaper;
 pub mod thread;

@@ -32,6 +32,7 @@ use super::hints::Hints;
 use super::intake::Intake;
 use super::mailbox::{Mailbox, Submission, Taken, UiSubmission};
 use super::observed::{KeyInstants, Observed, PictureInstants, alternation};
+use super::owed::OwedPicture;
 use super::{FromStream, StreamEvent};
 use crate::clock::{self, Alarm, Woken};
 use crate::control::StreamStatus;
@@ -45,8 +46,6 @@ use crate::sink::worker::SinkWorker;
 /// Refreshes in a row with nothing new to show, after which the thread waits for the next key
 /// alone. Easing ends well before.
 const REPEATS_BEFORE_IDLE: u32 = 120;
-/// By how much a wake may come late when a key is to be taken in just before a picture.
-const LATE_WAKE: MonoSpan = MonoSpan::from_us(250);
 /// Time between two reports of counts.
 const STATISTICS_INTERVAL: MonoSpan = MonoSpan::from_ms(250);
 /// Real-time priority, at the lower end: above every ordinary thread, below what drives devices.
@@ -112,12 +111,10 @@ struct StreamThread {
     intake: Intake,
     /// The newest key, until the first picture made from it is shown.
     unshown: Option<Unshown>,
-    /// Whether no picture was made since the newest key was taken in.
-    owes_picture: bool,
-    /// The refresh that the owed picture was planned for first. Keys may be heard no longer than
-    /// for that one, or keys that cost more and more would put the picture off for ever.
-    owed_for: Option<MonoTime>,
+    owed: OwedPicture,
     refused: u64,
+    /// Keys that were taken in and superseded before any picture of them was shown.
+    unseen: u64,
     /// What is wrong with the client's motion. None until enough keys have moved to tell.
     suspicion: Option<String>,
     repeats_in_a_row: u32,
@@ -172,9 +169,9 @@ impl StreamThread {
             window,
             intake: Intake::default(),
             unshown: None,
-            owes_picture: false,
-            owed_for: None,
+            owed: OwedPicture::default(),
             refused: 0,
+            unseen: 0,
             suspicion: None,
             repeats_in_a_row: 0,
             told_of_fall: false,
@@ -213,12 +210,11 @@ impl StreamThread {
                 self.repeats_in_a_row >= REPEATS_BEFORE_IDLE && !self.core.is_to_show_again();
             let is_idle = plan.content_time.is_none() || is_settled;
             let wake_at = if is_idle { MonoTime::FAR_FUTURE } else { plan.wake_at };
-            if self.owes_picture && !is_idle {
+            if self.owed.is_owed() && !is_idle {
                 // The newest key of those that come until then is what the picture shows.
-                let hears_until = wake_at - self.key_work - LATE_WAKE;
-                let owed_for = *self.owed_for.get_or_insert(plan.present_at);
-                if plan.present_at <= owed_for && clock::now() < hears_until {
-                    clock::sleep_until(hears_until);
+                let hears_until = self.owed.hears_until(&plan, self.key_work);
+                if let Some(until) = hears_until.filter(|&until| clock::now() < until) {
+                    clock::sleep_until(until);
                 } else {
                     clock::sleep_until(wake_at);
                     self.make_frame(&plan);
@@ -293,8 +289,8 @@ impl StreamThread {
         self.watch_motion(report.motion);
         self.key_work = clock::now() - started_at;
         self.repeats_in_a_row = 0;
-        self.owes_picture = true;
-        self.unshown = Some(Unshown {
+        self.owed.on_key();
+        let superseded = self.unshown.replace(Unshown {
             key_index: submit.key_index,
             instants: KeyInstants {
                 arrived_at: *arrived_at,
@@ -302,6 +298,7 @@ impl StreamThread {
                 taken_in_at: started_at + self.key_work,
             },
         });
+        self.unseen += u64::from(superseded.is_some());
         self.send_pacing(submit.key_index);
         self.send_hint(submit);
         self.look_at_motion();
@@ -347,8 +344,7 @@ impl StreamThread {
 
     fn make_frame(&mut self, plan: &Plan) {
         let begun_at = clock::now();
-        self.owes_picture = false;
-        self.owed_for = None;
+        self.owed.on_picture();
         if let Some(submission) = self.parts.mailbox.take_ui() {
             self.take_ui(&submission);
         }
@@ -523,7 +519,7 @@ impl StreamThread {
         self.send(StreamEvent::Statistics(Statistics {
             stream: 0,
             keys_received: keys.received,
-            keys_superseded: keys.superseded,
+            keys_superseded: keys.superseded + self.unseen,
             keys_refused: keys.refused + self.refused,
             presented: frames.real + frames.synthesised + frames.repeated,
             real: frames.real,
@@ -555,7 +551,7 @@ impl StreamThread {
             on_target_percent,
             latency_ms: self.observed.stages(),
             ready_before_refresh: self.observed.headroom(),
-            keys: [keys.received, keys.superseded, keys.refused + self.refused],
+            keys: [keys.received, keys.superseded + self.unseen, keys.refused + self.refused],
             frames: [frames.real, frames.synthesised, frames.repeated, frames.dropped],
             models_percent: models
                 .into_iter()

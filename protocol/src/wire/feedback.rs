@@ -97,7 +97,7 @@ pub struct Statistics {
     pub stream: u32,
     /// Key frames that arrived.
     pub keys_received: u64,
-    /// Of these, replaced by a newer one before they were latched.
+    /// Of these, replaced by a newer one before a picture of them was shown.
     pub keys_superseded: u64,
     /// Of these, with planes that do not fit the stream.
     pub keys_refused: u64,

@@ -14,6 +14,7 @@ use foreframe_engine::{
     UiInput,
 };
 use foreframed::stream::core::{CoreConfig, FrameKind, FrameOutcome, PresentedFrame, StreamCore};
+use foreframed::stream::owed::OwedPicture;
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 
@@ -79,7 +80,7 @@ pub struct OutputFrame {
 pub struct Losses {
     /// Pictures that were not ready for their refresh.
     pub dropped: u64,
-    /// Keys that a newer one replaced before they were taken in.
+    /// Keys that a newer one replaced before a picture of them was made.
     pub superseded: u64,
     /// Why each refused key was refused, in order.
     pub refused: Vec<String>,
@@ -146,11 +147,15 @@ pub fn replay(
             stream.core.on_news();
         }
         let plan = stream.core.plan(clock);
-        let is_taken = |key: &mut TimedKey| {
-            plan.content_time.is_none() || (!stream.owes_picture && key.arrives_at <= plan.wake_at)
+        let hears_until = stream.owed.hears_until(&plan, MonoSpan::ZERO);
+        let is_taken = |key: &mut TimedKey| match hears_until {
+            _ if plan.content_time.is_none() => true,
+            Some(until) => clock < until && key.arrives_at <= until,
+            None => !stream.owed.is_owed() && key.arrives_at <= plan.wake_at,
         };
         if let Some(mut key) = next.take_if(is_taken) {
-            clock = clock.max(key.arrives_at);
+            // What comes while a picture is owed waits until that has to hear of it.
+            clock = clock.max(hears_until.unwrap_or(key.arrives_at));
             next = keys.next().transpose()?;
             // Newest wins, as in the daemon: what came meanwhile replaces what waited.
             while let Some(newer) = next.take_if(|newer| newer.arrives_at <= clock) {
@@ -161,7 +166,7 @@ pub fn replay(
             last_arrivals = [last_arrivals[1], key.arrives_at];
             match stream.core.on_key(&key.frame.as_input(), || clock) {
                 Ok(_) => {
-                    stream.owes_picture = true;
+                    losses.superseded += u64::from(stream.owed.on_key());
                     if let Some(ui) = key.frame.ui_input() {
                         stream.core.set_ui(&ui, key.arrives_at)?;
                     }
@@ -171,7 +176,7 @@ pub fn replay(
             continue;
         }
         let interval = (last_arrivals[1] - last_arrivals[0]).max(config.refresh_interval);
-        let has_shown_all = next.is_none() && next_ui.is_none() && !stream.owes_picture;
+        let has_shown_all = next.is_none() && next_ui.is_none() && !stream.owed.is_owed();
         let end = (last_arrivals[1] + interval).max(last_ui + config.refresh_interval);
         let is_over = has_shown_all && plan.present_at > end;
         if plan.content_time.is_none() || (is_over && stream.shown.is_some()) {
@@ -199,7 +204,7 @@ pub fn replay(
             poses = later;
         }
         clock = plan.wake_at + stream.work;
-        stream.owes_picture = false;
+        stream.owed.on_picture();
         let outcome = stream.core.make(&plan, || clock);
         match outcome.and_then(|outcome| stream.on_outcome(outcome, plan.present_at)) {
             Some(frame) => show(&frame, &stream.picture)?,
@@ -216,9 +221,8 @@ struct VirtualStream {
     shown: Option<OutputFrame>,
     /// The picture on the display. What was made and dropped is not.
     picture: ColorPlane,
-    /// Whether no picture was made since the newest key: between two keys there is always one, as
-    /// in the daemon.
-    owes_picture: bool,
+    /// Between two keys there is always a picture, as in the daemon.
+    owed: OwedPicture,
 }
 
 impl VirtualStream {
@@ -242,7 +246,7 @@ impl VirtualStream {
         }
         let work = MAX_WORK.min(refresh_interval.scale(1, 4));
         let picture = ColorPlane::default();
-        Self { core, work, refresh_interval, shown: None, picture, owes_picture: false }
+        Self { core, work, refresh_interval, shown: None, picture, owed: OwedPicture::default() }
     }
 
     /// What the refresh at `present_at` shows after `outcome`; None if its picture was dropped.
