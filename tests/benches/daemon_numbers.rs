@@ -19,7 +19,12 @@ use foreframe_protocol::{
     MotionDirection, MotionFormat, MotionUnit, OutputReleased, PlaneKind, Statistics, StreamFormat,
     Submit,
 };
+use foreframed::huge_pages::HugePages;
 use foreframed::{Args, clock};
+
+/// As in `foreframed`.
+#[global_allocator]
+static ALLOCATOR: HugePages = HugePages;
 
 const KEYS_PER_S: i64 = 40;
 const SECONDS: i64 = 10;

@@ -341,7 +341,7 @@ fn a_client_that_scribbles_over_its_slots_spoils_nothing_but_its_picture() {
 }
 
 #[test]
-fn keys_faster_than_they_can_be_taken_are_superseded_and_the_newest_wins() {
+fn keys_faster_than_they_can_be_taken_are_superseded_and_every_one_is_accounted_for() {
     let daemon = RunningDaemon::start("shm");
     let mut client = daemon.connect();
     let mut source = client.open_stream(1, 512, 512);
@@ -361,6 +361,20 @@ fn keys_faster_than_they_can_be_taken_are_superseded_and_the_newest_wins() {
         last = burst.last().copied();
     }
     client.expect_presented(&last.unwrap());
+    client.send(DestroyStream { stream: 1 });
+    client.expect("the stream's end", |message| {
+        matches!(message, DaemonMessage::StreamEnded(_)).then_some(())
+    });
+    let told = client.take_waiting();
+    let counts = told.iter().rev().find_map(|message| match message {
+        DaemonMessage::Statistics(counts) => Some(*counts),
+        _ => None,
+    });
+    let counts = counts.expect("the last counts");
+    let is_presented = |message: &&DaemonMessage| matches!(message, DaemonMessage::Presented(_));
+    let presented = 1 + told.iter().filter(is_presented).count() as u64;
+    assert_eq!((counts.keys_received, counts.keys_refused), (120, 0), "{counts:?}");
+    assert_eq!(presented + counts.keys_superseded, 120, "{presented} shown, {counts:?}");
 }
 
 #[test]
