@@ -2,9 +2,9 @@
 
 use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
 
-/// A plane that has to find memory for so many bytes lets every thread of its pool find a part: the
-/// system hands out pages when they are first written to, each emptied first.
-const SHARED_BYTES: usize = 1 << 20;
+/// Bytes that a thread finds memory for by itself, at least: half of a huge page. The system hands
+/// out pages when they are first written to, each emptied first, so threads share that.
+const SHARE_BYTES: usize = 1 << 20;
 
 /// A row-major image without padding. `data.len() == width * height` holds always.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
@@ -28,8 +28,8 @@ impl<T: Copy + Default + Send> Plane<T> {
         self.height = height;
         let count = width as usize * height as usize;
         let is_in_pool = rayon::current_thread_index().is_some();
-        if count > self.data.capacity() && count * size_of::<T>() >= SHARED_BYTES && is_in_pool {
-            let share = SHARED_BYTES / 4 / size_of::<T>();
+        if count > self.data.capacity() && count * size_of::<T>() >= 2 * SHARE_BYTES && is_in_pool {
+            let share = SHARE_BYTES / size_of::<T>();
             self.data = Vec::new(); // first, so that there are never two
             let pixels = (0..count).into_par_iter().with_min_len(share).map(|_| T::default());
             pixels.collect_into_vec(&mut self.data);
@@ -146,7 +146,7 @@ mod tests {
             plane
         };
         for sizes in
-            [&[[640, 409]][..], &[[641, 409]], &[[8, 8], [1280, 720]], &[[1280, 720], [7, 5]]]
+            [&[[1023, 512]][..], &[[1024, 512]], &[[8, 8], [1280, 720]], &[[1280, 720], [7, 5]]]
         {
             let [width, height] = sizes[sizes.len() - 1];
             let shared = pool.install(|| resized(sizes));

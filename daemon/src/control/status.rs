@@ -63,7 +63,8 @@ pub struct StreamStatus {
     /// How long before its refresh a picture was ready: of the last 128 pictures, how many fall
     /// below 0 ms (late), 1, 2, 4, 8 and above.
     pub ready_before_refresh: [u32; 6],
-    /// Keys since the start: received, replaced by a newer one before they were shown, refused.
+    /// Keys since the start: received, replaced by a newer one before a picture of
+    /// them was handed to the display, refused.
     pub keys: [u64; 3],
     /// Refreshes since the start: real, synthesised, repeated, dropped.
     pub frames: [u64; 4],

@@ -1,7 +1,8 @@
-//! Between two keys that are taken in there is a picture: until it is made, it is owed.
+//! A key that was taken in is owed a picture, until that is made or a newer key supersedes it.
 //!
-//! It shows the newest of the keys that come before it. Live and replay ask here until when that
-//! is, each with its own clock.
+//! The picture shows the newest of the keys that come before it. Live and replay ask here until
+//! when that is, each with its own clock. A newer key can need a picture that takes longer than
+//! the one that was planned; that costs one refresh at most, and then no key is waited for.
 
 use foreframe_engine::pacing::Plan;
 use foreframe_engine::{MonoSpan, MonoTime};

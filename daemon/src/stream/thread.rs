@@ -113,7 +113,7 @@ struct StreamThread {
     unshown: Option<Unshown>,
     owed: OwedPicture,
     refused: u64,
-    /// Keys that were taken in and superseded before any picture of them was shown.
+    /// Keys that were taken in and superseded before any picture of them was handed over.
     unseen: u64,
     /// What is wrong with the client's motion. None until enough keys have moved to tell.
     suspicion: Option<String>,

@@ -97,7 +97,8 @@ pub struct Statistics {
     pub stream: u32,
     /// Key frames that arrived.
     pub keys_received: u64,
-    /// Of these, replaced by a newer one before a picture of them was shown.
+    /// Of these, replaced by a newer one before a picture of them was handed to the
+    /// display, before or after they were latched.
     pub keys_superseded: u64,
     /// Of these, with planes that do not fit the stream.
     pub keys_refused: u64,

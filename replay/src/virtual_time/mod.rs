@@ -221,7 +221,7 @@ struct VirtualStream {
     shown: Option<OutputFrame>,
     /// The picture on the display. What was made and dropped is not.
     picture: ColorPlane,
-    /// Between two keys there is always a picture, as in the daemon.
+    /// Whether the newest key still has no picture.
     owed: OwedPicture,
 }
 
