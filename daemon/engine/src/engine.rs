@@ -11,7 +11,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::backend::fallback::{Backend, Made};
 use crate::backend::gpu::{Gpu, GpuPicture};
-use crate::backend::{BackendStatus, FrameInput};
+use crate::backend::{BackendStatus, FrameInput, Passes};
 use crate::color::ColorPlane;
 use crate::decode::{DecodeError, DecodeScratch, decode_key};
 use crate::diagnosis::MotionCheck;
@@ -20,6 +20,8 @@ use crate::field::FieldMap;
 use crate::finish::{Finish, FinishConfig};
 use crate::format::{DepthMeaning, StreamFormat};
 use crate::key::{KeyFrame, KeyInput};
+use crate::light::Light;
+use crate::light::relight::relight;
 use crate::method::Method;
 use crate::multiplex::Multiplex;
 use crate::phase::Phase;
@@ -136,6 +138,8 @@ pub struct Engine {
     /// Of methods whose trajectories are more than the motion field.
     ladder: Option<Ladder>,
     backend: Backend,
+    /// Of methods that go by evidence.
+    light: Option<Light>,
     /// Of streams whose pictures are finished.
     finish: Option<Finish>,
     /// Of streams that send reduced keys in between.
@@ -173,6 +177,7 @@ impl Engine {
             scratch: Scratch::default(),
             ladder: Ladder::new(config.method, config.pixels_per_degree),
             backend: Backend::default(),
+            light: light_of(config.method, &format),
             finish: finish.filter(|_| finishes),
             multiplex,
             ui: UiLayer::default(),
@@ -183,8 +188,8 @@ impl Engine {
     /// Makes pictures on `gpu` instead of the CPU, as long as it works. To be called before the
     /// first key. [`Engine::backend`] says how it went.
     pub fn use_gpu(&mut self, gpu: &Arc<Gpu>) {
-        let finishes = self.finish.is_some();
-        self.backend.use_gpu(gpu, self.format.color, self.config.method.warp(), finishes);
+        let passes = Passes { relights: self.light.is_some(), finishes: self.finish.is_some() };
+        self.backend.use_gpu(gpu, self.format.color, self.config.method.warp(), passes);
     }
 
     /// Makes in-between frames by `method` from now on, on `gpu` where there is one and none has
@@ -196,6 +201,7 @@ impl Engine {
         }
         self.config.method = method;
         self.ladder = Ladder::new(method, self.config.pixels_per_degree);
+        self.light = light_of(method, &self.format);
         let has_failed = self.backend.status().fell_back.is_some();
         self.backend.restart();
         if let Some(gpu) = gpu.filter(|_| !has_failed) {
@@ -321,6 +327,7 @@ impl Engine {
             self.scratch.map.update(key.valid, cells, key.field_offset);
         }
         self.backend.take_key(&self.pool, self.config.method.warp(), &key, &self.scratch.map);
+        self.follow_light(&key);
         if let Some(finish) = &mut self.finish {
             let evidence = self.ladder.as_ref().map(Ladder::evidence);
             let older = self.newest.as_ref();
@@ -374,6 +381,19 @@ impl Engine {
             decode.take_flow(&self.pool, flow, older.content_time, pixels_per_degree, key);
         }
         is_found
+    }
+
+    /// Takes in how the light of `key`, the one that is coming, has changed.
+    fn follow_light(&mut self, key: &KeyFrame) {
+        let Some((light, ladder)) = self.light.as_mut().zip(self.ladder.as_ref()) else { return };
+        let is_cut = key.is_cut || key.is_found_cut;
+        match self.newest.as_ref().filter(|_| !is_cut && !ladder.shows_the_same()) {
+            Some(older) => {
+                let is_followed = |at| ladder.is_followed(at);
+                light.take_key(&self.pool, key, older, &self.scratch.map, is_followed);
+            }
+            None => light.forget(),
+        }
     }
 
     /// Lets the cells of `key` go by the motion of the picture whose mask says so.
@@ -491,6 +511,7 @@ impl Engine {
         let is_after = shown.is_none() && !self.config.method.interpolates();
         let moved = if is_after { phase } else { Phase::ZERO };
         let part = self.finish.as_mut().map(|finish| finish.next_part(moved));
+        let gains = self.light.as_mut().and_then(|light| light.gains(&self.pool, moved));
         let Made { is_finished, kept } = if let Some(shown) = shown {
             out.copy_from(&shown.color);
             Made { is_finished: false, kept: None }
@@ -502,9 +523,12 @@ impl Engine {
             let known = previous.into_iter().chain(&self.remembered);
             let known = past.iter_mut().zip(known).map(|(past, key)| *past = key).count();
             let past = &past[..known];
-            let frame = FrameInput { method, phase, newest: key, past, map, finish };
+            let frame = FrameInput { method, phase, newest: key, past, map, gains, finish };
             self.backend.make(&self.pool, &frame, out, keeps)
         };
+        if let Some(gains) = gains.filter(|_| !is_finished) {
+            relight(&self.pool, gains, key.valid, out);
+        }
         if let Some((finish, part)) = self.finish.as_mut().zip(part).filter(|_| !is_finished) {
             finish.apply(&self.pool, part, key.valid, out);
         }
@@ -516,6 +540,11 @@ impl Engine {
         let work = (self.config.timer)() - started_at;
         Some((FrameReport { key_index: key.index, phase, work }, kept))
     }
+}
+
+/// What continues the light of a stream of `method`.
+fn light_of(method: Method, format: &StreamFormat) -> Option<Light> {
+    (method == Method::Auto).then(|| Light::new(format.color))
 }
 
 /// A pool of `threads`, or of as many as the system starts, which go through kernels as `simd`

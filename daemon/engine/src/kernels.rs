@@ -8,6 +8,7 @@ use crate::backend::shader::Shader;
 use crate::fill::far_side::FAR_SIDE;
 use crate::finish::compensate::COMPENSATE;
 use crate::finish::pyramid::PYRAMID;
+use crate::light::relight::RELIGHT;
 use crate::trajectory::effective::EFFECTIVE;
 use crate::warp::blend::BLEND;
 use crate::warp::gather::GATHER;
@@ -57,6 +58,8 @@ pub const KERNELS: &[Kernel] = &[
     exact("warp/grid", "warp_grid", Some(&GRID)),
     exact("warp/voxel", "warp_voxel", Some(&VOXEL)),
     exact("warp/voxel", "older_part", Some(&VOXEL_OLDER)),
+    exact("light", "measure", None),
+    exact("light/relight", "relight", Some(&RELIGHT)),
     exact("finish/selection", "take_key", None),
     exact("finish/pyramid", "pyramid", Some(&PYRAMID)),
     exact("finish/compensate", "compensate", Some(&COMPENSATE)),

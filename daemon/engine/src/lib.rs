@@ -7,6 +7,7 @@
 //! inside; [`evidence`] judges what was predicted of it; [`trajectory`] says how its surfaces go on
 //! and quantises that; of an in-between frame: [`warp`]
 //! scatters or gathers along the trajectories, [`fill`] repairs what no source pixel lands on,
+//! [`light`] goes on changing where nothing that moves explains it,
 //! [`finish`] moves detail from in-between frames to their keys where it is asked to.
 //! [`engine`] runs these steps in order, [`pacing`] says for which content time.
 //!
@@ -28,6 +29,7 @@ pub mod inspect;
 pub mod kernels;
 pub mod key;
 mod lanes;
+pub mod light;
 pub mod mask;
 pub mod method;
 pub mod multiplex;

@@ -9,9 +9,9 @@ use std::sync::Arc;
 
 use rayon::ThreadPool;
 
-use super::FrameInput;
 use super::cpu::CpuBackend;
 use super::gpu::{Gpu, GpuBackend, GpuError, GpuPicture};
+use super::{FrameInput, Passes};
 use crate::color::{ColorFormat, ColorPlane};
 use crate::field::FieldMap;
 use crate::key::KeyFrame;
@@ -35,7 +35,7 @@ impl Default for BackendStatus {
 /// A picture that was made.
 #[derive(Debug)]
 pub(crate) struct Made {
-    /// Whether it is finished already.
+    /// Whether its passes are done already.
     pub(crate) is_finished: bool,
     /// Where it is, if it stayed on a device.
     pub(crate) kept: Option<GpuPicture>,
@@ -61,16 +61,15 @@ impl Backend {
             Self { status: BackendStatus { fell_back, ..Default::default() }, ..Self::default() };
     }
 
-    /// Runs on `gpu` from the next key on, in a stream that has had none.
-    /// It finishes pictures too where `finishes`.
+    /// Runs on `gpu` from the next key on, in a stream that has had none and may need `passes`.
     pub(crate) fn use_gpu(
         &mut self,
         gpu: &Arc<Gpu>,
         format: ColorFormat,
         method: Method,
-        finishes: bool,
+        passes: Passes,
     ) {
-        match GpuBackend::new(gpu, format, method, finishes) {
+        match GpuBackend::new(gpu, format, method, passes) {
             Ok(backend) => {
                 self.gpu = Some(backend);
                 self.status.name = format!("gpu:{}", gpu.name());

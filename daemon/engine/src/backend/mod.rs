@@ -20,6 +20,7 @@ use crate::finish::shares::Split;
 use crate::key::KeyFrame;
 use crate::method::Method;
 use crate::phase::Phase;
+use crate::plane::Plane;
 
 /// What one picture is made of.
 #[derive(Clone, Copy, Debug)]
@@ -35,6 +36,17 @@ pub struct FrameInput<'a> {
     pub past: &'a [&'a KeyFrame],
     /// Where the cells of `newest`'s field lie.
     pub map: &'a FieldMap,
+    /// How much brighter it is, per tile ([`crate::light`]), on a backend that can.
+    pub gains: Option<&'a Plane<i32>>,
     /// What the picture is finished with, on a backend that can.
     pub finish: Option<Split<'a>>,
+}
+
+/// What pictures of a stream may go through after their warp.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Passes {
+    /// [`crate::light`].
+    pub relights: bool,
+    /// [`crate::finish`].
+    pub finishes: bool,
 }

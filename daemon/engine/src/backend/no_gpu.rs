@@ -9,8 +9,8 @@ use std::sync::Arc;
 
 pub use error::GpuError;
 
-use super::FrameInput;
 use super::choice::AdapterFacts;
+use super::{FrameInput, Passes};
 use crate::color::{ColorFormat, ColorPlane};
 use crate::field::FieldMap;
 use crate::key::KeyFrame;
@@ -73,7 +73,7 @@ impl GpuBackend {
         gpu: &Arc<Gpu>,
         _: ColorFormat,
         _: Method,
-        _: bool,
+        _: Passes,
     ) -> Result<Self, GpuError> {
         match gpu.0 {}
     }

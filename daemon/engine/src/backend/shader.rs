@@ -142,6 +142,8 @@ pub enum Slot {
     Lights,
     /// How far tiles are blurred, four to a word: [`crate::finish::selection`].
     Weights,
+    /// How much brighter tiles are: [`crate::light::Light::gains`].
+    Gains,
     /// The picture.
     Out,
 }

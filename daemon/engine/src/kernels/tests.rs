@@ -228,6 +228,7 @@ fn constants_of_the_shaders_are_those_of_the_cpu() {
     use crate::color::ColorFormat::{Rgb10a2, Rgba8, Rgba16f};
     use crate::fill::far_side::{NO_CELL, NO_ROW};
     use crate::finish::selection;
+    use crate::light::{self, relight};
     use crate::params::format_code;
     use crate::warp::grid::{FARTHEST, LANES};
     use crate::warp::resolve::HOLE;
@@ -235,6 +236,7 @@ fn constants_of_the_shaders_are_those_of_the_cpu() {
     let listed = [LINEAR.entries[1], PREVIOUS[0].entries[0], FAR_SIDE.entries[2], VOXEL.entries[1]];
     let group = listed[0].workgroup;
     assert!(listed.iter().all(|entry| entry.workgroup == group), "all of them go over lists");
+    assert_eq!(selection::TILE, light::TILE, "two shaders call it by one name");
     let hole = u32::from(HOLE.x.cast_unsigned()) | u32::from(HOLE.y.cast_unsigned()) << 16;
     let expected = [
         ("HOLE", i64::from(hole)),
@@ -258,6 +260,9 @@ fn constants_of_the_shaders_are_those_of_the_cpu() {
         ("LARGEST", i64::from(crate::trajectory::effective::LARGEST)),
         ("FULL_LIGHT", i64::from(foreframe_perception::compensation::FULL_LIGHT)),
         ("TILE", i64::from(selection::TILE)),
+        ("WAYS", i64::from(relight::WAYS)),
+        ("BLACK", i64::from(relight::BLACK)),
+        ("BRIGHTEST", i64::from(relight::BRIGHTEST)),
         ("FULL", i64::from(selection::FULL)),
         ("RGBA8", i64::from(format_code(Rgba8))),
         ("RGB10A2", i64::from(format_code(Rgb10a2))),

@@ -25,8 +25,8 @@ pub use device::Gpu;
 pub use error::GpuError;
 pub use picture::GpuPicture;
 
-use super::FrameInput;
 use super::shader::{Extent, LIST_HEADER, STRIP, Shader, Slot};
+use super::{FrameInput, Passes};
 use crate::color::{ColorFormat, ColorPlane};
 use crate::field::FieldMap;
 use crate::fill::far_side::FAR_SIDE;
@@ -34,6 +34,7 @@ use crate::finish::compensate::COMPENSATE;
 use crate::finish::pyramid::PYRAMID;
 use crate::finish::shares::Split;
 use crate::key::KeyFrame;
+use crate::light::relight::RELIGHT;
 use crate::method::Method;
 use crate::params::{FrameParams, light_words, map_words, weight_words};
 use crate::phase::Phase;
@@ -111,6 +112,8 @@ pub(crate) struct GpuBackend {
     frame_steps: Vec<Step>,
     unmoved_steps: Vec<Step>,
     filling_steps: Vec<Step>,
+    /// Empty in a stream whose light is not continued.
+    relight_steps: Vec<Step>,
     /// Empty in a stream that is not finished.
     finish_steps: Vec<Step>,
     /// Whether the light of levels is on the device.
@@ -133,7 +136,7 @@ pub(crate) struct GpuBackend {
 }
 
 impl GpuBackend {
-    /// For a stream of `format` and `method`, which is finished or not. Compiles what it needs.
+    /// For a stream of `format` and `method` that may need `passes`. Compiles what it needs.
     ///
     /// # Errors
     /// If the device is gone or takes a shader not.
@@ -141,7 +144,7 @@ impl GpuBackend {
         gpu: &Arc<Gpu>,
         format: ColorFormat,
         method: Method,
-        finishes: bool,
+        passes: Passes,
     ) -> Result<Self, GpuError> {
         let steps = |shaders: &[&'static Shader]| -> Result<Vec<Step>, GpuError> {
             shaders.iter().map(|shader| Ok((*shader, gpu.shader(shader, format)?))).collect()
@@ -154,7 +157,8 @@ impl GpuBackend {
             frame_steps: steps(frame_shaders(method))?,
             unmoved_steps: steps(unmoved_shaders(method))?,
             filling_steps: steps(filling_shaders(method))?,
-            finish_steps: if finishes { steps(&FINISH_SHADERS)? } else { Vec::new() },
+            relight_steps: if passes.relights { steps(&[&RELIGHT])? } else { Vec::new() },
+            finish_steps: if passes.finishes { steps(&FINISH_SHADERS)? } else { Vec::new() },
             has_lights: false,
             planes: Planes::default(),
             field_upload: Default::default(),
@@ -342,6 +346,7 @@ impl GpuBackend {
                     | Slot::SmoothLevel
                     | Slot::Lights
                     | Slot::Weights
+                    | Slot::Gains
                     | Slot::Was
                     | Slot::Out => continue,
                 };
@@ -414,6 +419,11 @@ impl GpuBackend {
                 self.planes.put_missing(Slot::Out, spare);
             }
             self.planes.sized(&gpu, Slot::Out, size)?;
+            if let Some(gains) = frame.gains {
+                let bytes = gains.data().as_bytes();
+                let gains = self.planes.sized(&gpu, Slot::Gains, bytes.len() as u64)?;
+                gpu.queue.write_buffer(gains, 0, bytes);
+            }
             if let Some(split) = &frame.finish {
                 params = params.finished(split);
                 self.prepare_finish(split, &params, bytes_per_pixel)?;
@@ -427,6 +437,9 @@ impl GpuBackend {
             dispatch(&gpu, &mut commands, steps, &self.planes, &params)?;
             let linked = linked_keys(frame.newest, frame.past).min(self.filling_steps.len());
             dispatch(&gpu, &mut commands, &self.filling_steps[..linked], &self.planes, &params)?;
+            if frame.gains.is_some() {
+                dispatch(&gpu, &mut commands, &self.relight_steps, &self.planes, &params)?;
+            }
             if frame.finish.is_some() {
                 dispatch(&gpu, &mut commands, &self.finish_steps, &self.planes, &params)?;
             }

@@ -8,10 +8,16 @@ use crate::backend::shader::{Shader, Slot};
 use crate::params::FrameParams;
 
 /// Buffers by [`Slot`], and the one of the parameters.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Planes {
     planes: [Option<wgpu::Buffer>; Slot::COUNT],
     params: Option<wgpu::Buffer>,
+}
+
+impl Default for Planes {
+    fn default() -> Self {
+        Self { planes: [const { None }; Slot::COUNT], params: None }
+    }
 }
 
 impl Planes {

@@ -4,6 +4,8 @@ use super::test_adapters::test_gpus;
 use super::*;
 use crate::backend::cpu::CpuBackend;
 use crate::key::{Acceleration, Velocity};
+use crate::light::TILE;
+use crate::light::relight;
 use crate::plane::{Plane, Rect};
 use crate::testing::{hash, map_of, noise, plane, pool};
 use crate::time::MonoTime;
@@ -69,7 +71,8 @@ fn on_gpu(
     phases: impl Iterator<Item = Phase>,
 ) -> Vec<ColorPlane> {
     let (newest, past) = newest_and_past(keys);
-    let mut backend = GpuBackend::new(gpu, newest.color.format(), method, false).unwrap();
+    let mut backend =
+        GpuBackend::new(gpu, newest.color.format(), method, Passes::default()).unwrap();
     for key in keys {
         backend.take_key(key, &map_of_moving(key)).unwrap();
     }
@@ -93,7 +96,7 @@ fn input<'a>(
     newest: &'a KeyFrame,
     map: &'a FieldMap,
 ) -> FrameInput<'a> {
-    FrameInput { method, phase, newest, past, map, finish: None }
+    FrameInput { method, phase, newest, past, map, gains: None, finish: None }
 }
 
 /// The last of `keys`, and the others from the newest on.
@@ -331,7 +334,8 @@ fn a_picture_that_stays_on_its_device_is_the_one_that_would_come_back_whatever_f
             key(noise(FORMATS[0], 64, 40, 1), depth_noise(64, 40, 2), velocity_noise(64, 40, 6, 3));
         let map = map_of(&newest);
         let mut backend =
-            GpuBackend::new(&gpu, newest.color.format(), Method::Linear, false).unwrap();
+            GpuBackend::new(&gpu, newest.color.format(), Method::Linear, Passes::default())
+                .unwrap();
         backend.take_key(&newest, &map).unwrap();
         let mut out = newest.color.clone();
         let mut make = |phase, keeps| {
@@ -394,7 +398,7 @@ fn a_shader_that_does_not_compile_is_an_error_and_the_device_goes_on() {
             assert!(matches!(error, GpuError::Refused { .. }), "{text}: {error}");
         }
         assert!(!gpu.is_lost());
-        GpuBackend::new(&gpu, ColorFormat::Rgba8, Method::Blend, false).unwrap();
+        GpuBackend::new(&gpu, ColorFormat::Rgba8, Method::Blend, Passes::default()).unwrap();
     }
 }
 
@@ -402,7 +406,8 @@ fn a_shader_that_does_not_compile_is_an_error_and_the_device_goes_on() {
 fn a_step_before_its_key_is_an_error() {
     for gpu in test_gpus("a_step_before_its_key_is_an_error") {
         let key = key(noise(ColorFormat::Rgba8, 4, 4, 1), Plane::default(), Plane::default());
-        let mut backend = GpuBackend::new(&gpu, ColorFormat::Rgba8, Method::Blend, false).unwrap();
+        let mut backend =
+            GpuBackend::new(&gpu, ColorFormat::Rgba8, Method::Blend, Passes::default()).unwrap();
         let mut out = key.color.clone();
         let map = FieldMap::default();
         let made =
@@ -449,7 +454,13 @@ fn every_adapter_finishes_as_the_cpu_does() {
                     key.valid = Rect { x, y, width, height };
                 }
                 let map = map_of(&key);
-                let mut backend = GpuBackend::new(&gpu, format, Method::Gather, true).unwrap();
+                let mut backend = GpuBackend::new(
+                    &gpu,
+                    format,
+                    Method::Gather,
+                    Passes { finishes: true, ..Passes::default() },
+                )
+                .unwrap();
                 backend.take_key(&key, &map).unwrap();
                 let phase = Phase::from_f64(0.37);
                 finish.take_key(&pool(1), &key, None, &map, None);
@@ -477,6 +488,43 @@ fn every_adapter_finishes_as_the_cpu_does() {
                 let is_changed = difference(&plain, &finished).is_some();
                 assert!(is_changed || size == [1, 1] || mode == FinishMode::Auto);
             }
+        }
+    }
+}
+
+#[test]
+fn every_adapter_relights_as_the_cpu_does() {
+    let cases = [([1, 1], None), ([17, 9], None), ([203, 77], Some([3, 5, 190, 66]))];
+    for gpu in test_gpus("every_adapter_relights_as_the_cpu_does") {
+        for (seed, ((size, valid), format)) in
+            (0..).zip(cases.into_iter().flat_map(|case| FORMATS.map(|format| (case, format))))
+        {
+            let mut key = key(
+                noise(format, size[0], size[1], seed),
+                Plane::default(),
+                velocity_noise(size[0], size[1], 3, seed),
+            );
+            if let Some([x, y, width, height]) = valid {
+                key.valid = Rect { x, y, width, height };
+            }
+            let map = map_of(&key);
+            let tiles = [key.valid.width, key.valid.height].map(|side| side.div_ceil(TILE));
+            let gains = plane(tiles[0], tiles[1], |x, y| {
+                relight::gain(format, (hash(x, y, seed) % 1200).cast_signed() - 600)
+            });
+            let passes = Passes { relights: true, ..Passes::default() };
+            let mut backend = GpuBackend::new(&gpu, format, Method::Gather, passes).unwrap();
+            backend.take_key(&key, &map).unwrap();
+            let phase = Phase::from_f64(0.37);
+            let plain = on_cpu(Method::Gather, &[&key], phase);
+            let mut expected = plain.clone();
+            relight::relight(&pool(1), &gains, key.valid, &mut expected);
+            assert!(size == [1, 1] || expected != plain, "there is something to compare");
+            let gains = Some(&gains);
+            let frame = FrameInput { gains, ..input(Method::Gather, phase, &[], &key, &map) };
+            let mut made = key.color.clone();
+            backend.make(&frame, &mut made, false).unwrap();
+            assert_eq!(difference(&made, &expected), None, "{format:?} {size:?} on {}", gpu.name());
         }
     }
 }

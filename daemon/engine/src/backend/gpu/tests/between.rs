@@ -16,7 +16,8 @@ fn older(key: KeyFrame) -> KeyFrame {
 /// Frames between `older` and `newer`, after a key of another kind, on `gpu` and on the CPU.
 fn between(gpu: &Arc<Gpu>, older: &KeyFrame, newer: &KeyFrame) -> [Vec<ColorPlane>; 2] {
     let phases = || [0.1, 0.37, 0.5, 0.9].into_iter().map(Phase::from_f64);
-    let mut backend = GpuBackend::new(gpu, newer.color.format(), Method::Voxel, false).unwrap();
+    let mut backend =
+        GpuBackend::new(gpu, newer.color.format(), Method::Voxel, Passes::default()).unwrap();
     for key in [newer, older, newer] {
         backend.take_key(key, &map_of_moving(key)).unwrap();
     }
