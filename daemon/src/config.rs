@@ -47,7 +47,7 @@ pub struct Args {
     #[serde(default, deserialize_with = "from_name")]
     pub layout: Option<Layout>,
     /// Refresh rate of the output, 1 to 1000; a window has its display's [default: 120]
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = parse_real::<f64>)]
     pub refresh: Option<f64>,
     /// What makes the pictures: auto, cpu, gpu or gpu:NAME; `foreframe adapters` says what auto
     /// takes [default: auto]
@@ -61,11 +61,11 @@ pub struct Args {
     pub method: Option<Method>,
     /// Show at most so many frames a second, 1 to 1000, for a sink without a rate of its own
     /// [default: every refresh]
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = parse_real::<f64>)]
     pub cap: Option<f64>,
     /// Leave out in-between frames until something has moved by so many pixels, 0 to 16: fewer
     /// frames where little moves [default: 0, none are left out]
-    #[arg(long, value_name = "PX", allow_negative_numbers = true)]
+    #[arg(long, value_name = "PX", allow_negative_numbers = true, value_parser = parse_real::<f32>)]
     pub least_step: Option<f32>,
     /// What to draw into the pictures of windows: off, stats, motion, grid, rungs, disocclusion,
     /// tear, only-real or only-synthesised; `h` in a window goes through them [default: off]
@@ -80,7 +80,7 @@ pub struct Args {
     pub threads: Option<NonZeroUsize>,
     /// Pixels per degree of visual angle, 1 to 1000; turns on damping of motion that no eye can
     /// follow
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_real::<f32>)]
     pub ppd: Option<f32>,
     /// Blur in in-between frames, made up for in their keys: off, on, or auto, as far as no flicker
     /// is seen [default: off]
@@ -106,10 +106,10 @@ pub struct Args {
     #[arg(long, value_name = "LEVEL")]
     pub log: Option<String>,
     /// Clients that may be connected at once, 1 to 256 [default: 16]
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_whole::<usize>)]
     pub max_clients: Option<usize>,
     /// Memory that the streams of one client may cost, in MiB [default: 2048]
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_whole::<u64>)]
     pub memory_mb: Option<u64>,
     /// TOML file with the same names as these options; an option given here wins
     #[arg(long, value_name = "FILE")]
@@ -215,6 +215,16 @@ pub const VIEWING_CM: f64 = 65.0;
 /// What was expected and what was found.
 pub fn parse_count(text: &str) -> Result<NonZeroUsize, String> {
     text.parse().map_err(|_| format!("expected a whole number of 1 or more, found `{text}`"))
+}
+
+/// Reads a number; which ones may be is checked with all else.
+fn parse_real<T: FromStr>(text: &str) -> Result<T, String> {
+    text.parse().map_err(|_| format!("expected a number, found `{text}`"))
+}
+
+/// Reads a whole number; which ones may be is checked with all else.
+fn parse_whole<T: FromStr>(text: &str) -> Result<T, String> {
+    text.parse().map_err(|_| format!("expected a whole number of 0 or more, found `{text}`"))
 }
 
 fn from_name<'de, D, T>(deserializer: D) -> Result<Option<T>, D::Error>

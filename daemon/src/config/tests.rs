@@ -51,6 +51,18 @@ const EVERY_OPTION: [(&str, &str, &str); 21] = [
 ];
 
 #[test]
+fn what_is_no_number_is_told_what_was_expected() {
+    for option in ["refresh", "cap", "least-step", "ppd", "max-clients", "memory-mb", "threads"] {
+        let line = ["foreframed".to_owned(), format!("--{option}"), "some".to_owned()];
+        let error = Command::try_parse_from(line).unwrap_err().to_string();
+        let is_told = error.contains("expected a ")
+            && error.contains("number")
+            && error.contains("found `some`");
+        assert!(is_told, "{error}");
+    }
+}
+
+#[test]
 fn a_cap_is_a_whole_number_of_refreshes() {
     for (line, expected_hz) in [
         ("--refresh 120", 120.0),
