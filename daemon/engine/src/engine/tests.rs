@@ -9,6 +9,7 @@ use crate::format::{
 use crate::key::PlaneInput;
 
 mod change_of_method;
+mod light;
 mod mask;
 
 const SIZE: u32 = 16;
