@@ -20,11 +20,12 @@
 //! brighter by g ([`relight`]), which lies between tiles linearly. A half float is a logarithm
 //! already: c and t p are differences of its codes.
 //!
-//! Only surfaces that both keys show are compared, so that something bright that comes in front of
-//! something dark is no light. Where flow explains a tile, and after a cut, nothing is known. One
-//! row of tiles in eight is measured, in turn, and those near rows in which light has changed. Floats as in
-//! [`crate::trajectory`], quantised before a pixel is touched; made on the CPU whatever the backend.
-//! Exactness: `Exact`.
+//! Only surfaces that both keys show are compared, and only in tiles that move as one, so that
+//! something bright that comes in front of something dark is no light; and a tile that has half of
+//! the change around it alone is none either. Where flow explains a tile, without depth, and after a
+//! cut, nothing is known. One row of tiles in eight is measured, in turn, and those near rows in
+//! which light has changed. Floats as in [`crate::trajectory`], quantised before a pixel is touched;
+//! made on the CPU whatever the backend. Exactness: `Exact`.
 
 mod change;
 pub mod relight;
@@ -205,7 +206,7 @@ fn at(trend: &Plane<i16>, tile: [u32; 2], d: [i32; 2]) -> i32 {
         i32::from(trend.at(column.min(last[0]) as u32, row.min(last[1]) as u32))
     };
     let across = |row: i32| of(column, row) * (ACROSS - way_x) + of(column + 1, row) * way_x;
-    // Eleven bits and a sign, by twelve: the second product needs the room of 64.
+    // Eleven bits and a sign, times eleven bits twice: more than 32.
     let sum = i64::from(across(row)) * i64::from(ACROSS - way_y)
         + i64::from(across(row + 1)) * i64::from(way_y);
     (sum / (i64::from(ACROSS) * i64::from(ACROSS))) as i32
