@@ -138,7 +138,7 @@ pub struct Engine {
     /// Of methods whose trajectories are more than the motion field.
     ladder: Option<Ladder>,
     backend: Backend,
-    /// Of methods that go by evidence.
+    /// Of `auto`.
     light: Option<Light>,
     /// Of streams whose pictures are finished.
     finish: Option<Finish>,
@@ -387,7 +387,7 @@ impl Engine {
     fn follow_light(&mut self, key: &KeyFrame) {
         let Some((light, ladder)) = self.light.as_mut().zip(self.ladder.as_ref()) else { return };
         let is_cut = key.is_cut || key.is_found_cut;
-        match self.newest.as_ref().filter(|_| !is_cut && !ladder.shows_the_same()) {
+        match self.newest.as_ref().filter(|_| !is_cut) {
             Some(older) => {
                 let is_followed = |at| ladder.is_followed(at);
                 light.take_key(&self.pool, key, older, &self.scratch.map, is_followed);

@@ -26,10 +26,15 @@ const TORN: u16 = 24;
 /// the same in many.
 const NOTICED: f32 = 0.03;
 const NOTICED_TOGETHER: f32 = 0.5;
+/// How far what a tile is shown to do may be from what it did, pixels.
+const OTHERWISE_PX: f32 = 1.0;
 /// Added to luma of integer formats, per sample: noise in the dark is no change of light.
 const DARK: u32 = 4;
 /// Steps of a half float's luma per octave.
 const LUMA_STEPS: f32 = 8.0;
+/// The least luma of half floats that counts, that of 1/256 of white: its codes are a logarithm, in
+/// which noise in the dark would be the most of all.
+const DARKEST_HALF: u8 = 56;
 
 /// What is known of the light of a tile.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
@@ -73,7 +78,7 @@ impl<'a> Comparison<'a> {
 }
 
 /// Measures `changes`, one per tile, of the rows that are to be `measured`. Of the others nothing is
-/// known.
+/// known but how they move.
 pub fn measure(
     pool: &ThreadPool,
     comparison: &Comparison<'_>,
@@ -107,16 +112,13 @@ fn measure_in<T: Texel>(
         changes,
         #[inline(always)]
         |row, changes| {
-            if !measured[row as usize] {
-                changes.fill(Change::default());
-                return;
-            }
             for (column, change) in (0..).zip(changes) {
-                let sums = comparison.sums(planes, column, row);
-                *change = Change {
-                    octaves: octaves(format, sums),
-                    motion: comparison.motion(column, row),
+                let octaves = if measured[row as usize] {
+                    octaves(format, comparison.sums(planes, column, row))
+                } else {
+                    0.0
                 };
+                *change = Change { octaves, motion: comparison.motion(column, row) };
             }
         },
     );
@@ -145,7 +147,7 @@ impl Comparison<'_> {
         let lines = rows.map(|y| self.came().row(self.map.y.cell_of(y)));
         let cells = columns.map(|x| self.map.x.cell_of(x) as usize);
         let velocities = lines.map(|line| cells.map(|cell| line[cell]));
-        if is_torn(velocities.as_flattened()) {
+        if is_torn(velocities.as_flattened()) || self.goes_otherwise([columns[0], rows[0]]) {
             return sums;
         }
         for (y, velocities) in rows.into_iter().zip(velocities) {
@@ -158,6 +160,24 @@ impl Comparison<'_> {
             }
         }
         sums
+    }
+
+    /// Whether a pixel is not shown where its motion leads, or did not come by what is known of it:
+    /// it is held as nothing explains its motion, or too fast for any eye.
+    #[inline(always)]
+    fn goes_otherwise(&self, [x, y]: [u32; 2]) -> bool {
+        let Self { key, map, .. } = self;
+        let cell = [map.x.cell_of(x), map.y.cell_of(y)];
+        let came = self.came().at(cell[0], cell[1]);
+        let moved = [came.x, came.y].map(|v| f32::from(v) / f32::from(Velocity::PER_PX as i16));
+        let is_far = |by: [f32; 2]| by[0].abs().max(by[1].abs()) > OTHERWISE_PX;
+        let is_held = key.velocity.at(cell[0], cell[1]) == Velocity::default() && is_far(moved);
+        let told = || key.displacement.at(cell[0], cell[1]);
+        let is_damped = !key.displacement.data().is_empty() && {
+            let [dx, dy] = told();
+            is_far([dx - moved[0], dy - moved[1]])
+        };
+        is_held || is_damped
     }
 
     /// Luma of a pixel that came by `v`, and of where it was; None where that cannot be seen.
@@ -180,7 +200,8 @@ impl Comparison<'_> {
         let place =
             |at: u32, v: i16| at.cast_signed() * 256 - i32::from(v) * (256 / Velocity::PER_PX);
         let then = sample(then, valid, place(x, v.x), place(y, v.y));
-        Some([now.at(x, y).luma8(), then.luma8()])
+        let darkest = if key.color.format() == ColorFormat::Rgba16f { DARKEST_HALF } else { 0 };
+        Some([now.at(x, y), then].map(|texel| texel.luma8().max(darkest)))
     }
 
     /// How far the middle of a tile came.

@@ -10,10 +10,10 @@
 //! (2) R(s)^2 = (sum c c'_s)^2 / (sum c^2 sum c'_s^2),  a = sum c c'_s / sum c'_s^2
 //!                                              over 3x3 tiles ([`trend`])
 //! (3) t(x) = a c(x - s)                        a at most 1; 0 where R^2 < 1/2 or a < 0
-//! (4) g(y, p) = 2^(p t(y - v p))               at phase p, 1 at most; v the motion of the tile
+//! (4) g(y, p) = 2^(min(p, 1) t(y - v p))       at phase p; v the motion of the tile
 //! ```
 //!
-//! c' is the change that the key before has shown, along with the surfaces, and c'_s what moved by
+//! c' is the change that the key before has shown, per span of the newest, along with the surfaces, and c'_s what moved by
 //! s tiles over them since, 2 per axis at most: the s of the largest R. A change stays where a lamp
 //! grows brighter, and moves with the edge of a shadow. R^2 is the part of the change that was
 //! foreseen: none where light flickers, or where a change is noise or news. The picture is then made
@@ -22,8 +22,9 @@
 //!
 //! Only surfaces that both keys show are compared, and only in tiles that move as one, so that
 //! something bright that comes in front of something dark is no light; and a tile that has half of
-//! the change around it alone is none either. Where flow explains a tile, without depth, and after a
-//! cut, nothing is known. One row of tiles in eight is measured, in turn, and those near rows in
+//! the change around it alone is none either. Nothing is known where flow explains what motion does
+//! not, where a tile is not shown to go as it came (it is held, or damped), without depth, and after
+//! a cut. One row of tiles in eight is measured, in turn, and those near rows in
 //! which light has changed. Floats as in [`crate::trajectory`], quantised before a pixel is touched;
 //! made on the CPU whatever the backend. Exactness: `Exact`.
 
@@ -38,9 +39,10 @@ use rayon::ThreadPool;
 use crate::bands::for_each_row;
 use crate::color::ColorFormat;
 use crate::field::FieldMap;
-use crate::key::KeyFrame;
+use crate::key::{KeyFrame, Velocity};
 use crate::phase::Phase;
 use crate::plane::Plane;
+use crate::time::MonoSpan;
 use crate::warp::displacement;
 pub use change::measure;
 use change::{Change, Comparison, is_noticed};
@@ -75,6 +77,8 @@ pub struct Light {
     measured: Vec<bool>,
     watched: Vec<bool>,
     keys: u32,
+    /// Motion span of the last key.
+    span: Option<MonoSpan>,
     /// (4) of the picture being made.
     gains: Plane<i32>,
 }
@@ -93,11 +97,12 @@ impl Light {
             measured: Vec::new(),
             watched: Vec::new(),
             keys: 0,
+            span: None,
             gains: Plane::default(),
         }
     }
 
-    /// The scene is another, or nothing in it changes: forgets what is known.
+    /// The scene is another: forgets what is known.
     pub fn forget(&mut self) {
         self.changes.resize(0, 0);
         self.is_steady = true;
@@ -115,6 +120,9 @@ impl Light {
         is_followed: impl Fn([f32; 2]) -> bool + Sync,
     ) {
         let Some(comparison) = Comparison::new(key, older, map) else { return self.forget() };
+        let span = key.motion_span();
+        let ratio = span.zip(std::mem::replace(&mut self.span, span));
+        let ratio = ratio.map_or(1.0, |(now, then)| now.as_secs_f64() / then.as_secs_f64()) as f32;
         let size = [key.valid.width, key.valid.height].map(|side| side.div_ceil(TILE));
         std::mem::swap(&mut self.changes, &mut self.before);
         self.changes.resize(size[0], size[1]);
@@ -133,7 +141,7 @@ impl Light {
             return;
         }
         self.trend.resize(size[0], size[1]);
-        self.foreseen.carry(&self.changes, &self.before);
+        self.foreseen.carry(&self.changes, &self.before, ratio);
         let most = if self.format == ColorFormat::Rgba16f { MOST_LIGHT } else { MOST_LEVELS };
         let foreseen = &self.foreseen;
         let measured = &self.measured;
@@ -156,13 +164,21 @@ impl Light {
         self.take_turns();
     }
 
-    /// Finds the rows of tiles that are worth another look: near those in which light has changed.
+    /// Finds the rows of tiles that are worth another look: near those in which light has changed,
+    /// and where those go.
     fn watch(&mut self) {
         let rows = self.changes.height() as usize;
         self.watched.clear();
         self.watched.resize(rows, false);
         for row in (0..rows).filter(|row| self.measured[*row]) {
-            if is_noticed(self.changes.row(row as u32)) {
+            let changes = self.changes.row(row as u32);
+            if !is_noticed(changes) {
+                continue;
+            }
+            let most = changes.iter().max_by(|a, b| a.octaves.abs().total_cmp(&b.octaves.abs()));
+            let down = displacement(most.map_or(Velocity::default(), |it| it.motion), Phase::ONE)[1];
+            let goes_to = row.saturating_add_signed((down / (TILE as i32 * 256)) as isize);
+            for row in [row, goes_to.min(rows - 1)] {
                 self.watched[row.saturating_sub(NEAR)..(row + NEAR + 1).min(rows)].fill(true);
             }
         }

@@ -119,6 +119,49 @@ fn what_comes_in_front_is_no_light_and_neither_is_what_flow_explains() {
 }
 
 #[test]
+fn what_is_not_shown_to_go_as_it_came_has_no_light_of_its_own() {
+    let grows = |index: u32, _: f32, _: f32| 1.0 + 0.09 * index as f32;
+    let mut held = keys(grows);
+    for key in &mut held {
+        key.came = key.velocity.clone();
+        key.velocity = plane(SIZE[0], SIZE[1], |_, _| Velocity::default());
+    }
+    assert!(after(&held).gains(&pool(2), Phase::ONE).is_none());
+    let mut damped = keys(grows);
+    for key in &mut damped {
+        key.displacement = plane(SIZE[0], SIZE[1], |_, _| [PAN as f32 + 1.5, 0.0]);
+    }
+    assert!(after(&damped).gains(&pool(2), Phase::ONE).is_none());
+    for key in &mut damped {
+        key.displacement = plane(SIZE[0], SIZE[1], |_, _| [PAN as f32, 0.0]);
+    }
+    assert!(after(&damped).gains(&pool(2), Phase::ONE).is_some());
+}
+
+#[test]
+fn light_goes_on_by_time_and_not_by_keys() {
+    // A third of an octave per 100 ms, whatever the time between keys.
+    let between = [25, 25, 25, 25, 25, 25, 25, 25, 25, 25, 50, 25];
+    let mut at_ms = 0_u16;
+    let mut keys: Vec<KeyFrame> = Vec::new();
+    for (index, span) in (0..).zip(between) {
+        at_ms += span;
+        let level = 2.0_f32.powf(f32::from(at_ms) / 300.0);
+        let content_time = MonoTime::from_ns(1_000_000_000 + 1_000_000 * u64::from(at_ms));
+        let motion_from = keys.last().map(|key| key.content_time);
+        keys.push(KeyFrame { content_time, motion_from, ..key(index, |_, _| level) });
+    }
+    for count in [between.len() - 1, between.len()] {
+        let span = between[count - 1];
+        let mut light = after(&keys[..count]);
+        let gains = light.gains(&pool(2), Phase::ONE).unwrap();
+        let middle = gains.at(gains.width() / 2, gains.height() / 2) as f32 / 4096.0;
+        let expected = 2.0_f32.powf(f32::from(span) / 300.0);
+        assert!((middle / expected - 1.0).abs() < 0.02, "{span} ms: {middle} for {expected}");
+    }
+}
+
+#[test]
 fn nothing_changes_at_the_key_nor_in_steady_light_nor_after_a_cut() {
     let grows = |index: u32, _: f32, _: f32| 1.0 + 0.09 * index as f32;
     let mut light = after(&keys(grows));
@@ -157,7 +200,7 @@ fn a_picture_that_is_smaller_than_a_tile_or_has_another_shape_is_left_alone() {
     for key in &mut keys {
         key.valid = small;
     }
-    after(&keys);
+    assert!(after(&keys).gains(&pool(2), Phase::ONE).is_none());
     keys[5].valid.width = 2;
     after(&keys);
 }

@@ -31,8 +31,9 @@ pub(super) struct Foreseen {
 const MARGIN: u32 = AROUND + REACH.unsigned_abs();
 
 impl Foreseen {
-    /// Takes the changes `before` along to where those that are now came from.
-    pub(super) fn carry(&mut self, changes: &Plane<Change>, before: &Plane<Change>) {
+    /// Takes the changes `before` along to where those that are now came from, whose motion span is
+    /// `ratio` times as long.
+    pub(super) fn carry(&mut self, changes: &Plane<Change>, before: &Plane<Change>, ratio: f32) {
         let [width, height] = [changes.width(), changes.height()];
         for plane in [&mut self.before, &mut self.now] {
             plane.resize(width + 2 * MARGIN, height + 2 * MARGIN);
@@ -45,7 +46,7 @@ impl Foreseen {
             for (column, (carried, now)) in (0..).zip(carried.iter_mut().zip(now)) {
                 let change = changes.at(column, row);
                 let was = came_from([column, row], change.motion, [width - 1, height - 1]);
-                *carried = before.at(was[0], was[1]).octaves;
+                *carried = ratio * before.at(was[0], was[1]).octaves;
                 *now = change.octaves;
             }
         }
@@ -60,15 +61,16 @@ impl Foreseen {
         if squares <= 2.0 * LITTLE || largest > ALONE * squares {
             return 0.0;
         }
-        let (mut best, mut goes_on) = (FORESEEN, 0.0);
+        let (mut best, mut goes_on) = (0.0, 0.0);
         for down in -REACH..=REACH {
             for right in -REACH..=REACH {
                 let from = [at[0].wrapping_add_signed(-right), at[1].wrapping_add_signed(-down)];
                 let then = window(&self.before, from);
                 let (both, older) = (sum_of(&now, &then), sum_of(&then, &then) + LITTLE);
                 let stays = (right, down) == (0, 0);
-                let alike = both * both / (older * squares) + if stays { MOVED } else { 0.0 };
-                if both > 0.0 && alike > best {
+                let foreseen = both * both / (older * squares);
+                let alike = foreseen + if stays { MOVED } else { 0.0 };
+                if both > 0.0 && foreseen > FORESEEN && alike > best {
                     best = alike;
                     goes_on = (both / older).min(1.0) * self.now.at(from[0], from[1]);
                 }

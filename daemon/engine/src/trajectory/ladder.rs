@@ -114,12 +114,6 @@ impl Ladder {
         self.models.failed.at(at).is_some()
     }
 
-    /// Whether the newest key was seen to show what the key before did, and nothing moves in it.
-    #[must_use]
-    pub fn shows_the_same(&self) -> bool {
-        self.models.lacks_lattice
-    }
-
     /// Gives `key` its trajectories. It was decoded with its displacement; `older` is the key
     /// before it, unless this one is a cut, and `before` the one before that. `flow` looks at the
     /// pictures where motion was not estimated from them already.

@@ -17,9 +17,15 @@ fn stream(method: Method) -> Engine {
     Engine::new(format, EngineConfig::new(method, NonZeroUsize::MIN))
 }
 
-/// A still wall whose texture is lit by `percent`.
+/// A still wall whose texture is lit by `percent` everywhere.
 fn push_lit(engine: &mut Engine, at_ms: i64, percent: u32, is_cut: bool) {
-    let level = |pixel: u32| (40 + crate::testing::hash(pixel, 0, 5) % 60) * percent / 100;
+    push(engine, at_ms, |_| percent, is_cut);
+}
+
+/// A still wall whose texture is lit by so many percent per pixel.
+fn push(engine: &mut Engine, at_ms: i64, percent: impl Fn(u32) -> u32, is_cut: bool) {
+    let texture = |pixel: u32| 40 + crate::testing::hash(pixel, 0, 5) % 60;
+    let level = |pixel: u32| texture(pixel) * percent(pixel) / 100;
     let color: Vec<u8> = (0..SIDE * SIDE).flat_map(|pixel| [level(pixel) as u8; 4]).collect();
     let depth: Vec<u8> = (0..SIDE * SIDE).flat_map(|_| 2.0_f32.to_le_bytes()).collect();
     let motion = vec![0; 8 * (SIDE * SIDE) as usize];
@@ -60,9 +66,13 @@ fn what_grows_brighter_goes_on_by_auto_alone_and_not_across_a_cut() {
     // By as much as it did from the key before: 8 of 212 %.
     let grown = f64::from(next) / f64::from(now);
     assert!((1.02..1.06).contains(&grown), "{grown}");
-    push_lit(&mut auto, 25 * KEYS + 1, 250, true);
-    let [cut, .., later] = brightness(&mut auto);
-    assert_eq!(cut, later, "nothing is known after a cut");
+    // Of what has just been cut to, one step is known, which is too little to go by.
+    for key in [KEYS + 1, KEYS + 2] {
+        push_lit(&mut auto, 25 * key, 150 + 8 * key as u32, key == KEYS + 1);
+    }
+    let newest = 25 * (KEYS + 2);
+    let [cut, later] = [newest, newest + 12].map(|at_ms| frame(&mut auto, at_ms));
+    assert!(cut == later, "what was known before a cut goes on after it");
     let mut linear = stream(Method::Linear);
     grow(&mut linear);
     let [now, halfway, next] = brightness(&mut linear);
@@ -76,6 +86,39 @@ fn auto_that_was_chosen_while_it_ran_learns_it_anew() {
     engine.set_method(Method::Auto, None);
     let [now, .., next] = brightness(&mut engine);
     assert_eq!(now, next);
+    (1..=KEYS).for_each(|key| push_lit(&mut engine, 25 * (key + KEYS), 100 + 8 * key as u32, false));
+    let newest = 50 * KEYS;
+    let sum = |engine: &mut Engine, at_ms| frame(engine, at_ms).into_iter().map(u32::from).sum();
+    let [now, next]: [u32; 2] = [newest, newest + 25].map(|at_ms| sum(&mut engine, at_ms));
+    assert!(now < next, "{now} {next}");
+    engine.set_method(Method::Linear, None);
+    let later: u32 = sum(&mut engine, newest + 25);
+    assert_eq!(now, later);
+}
+
+#[test]
+fn a_small_lamp_and_dim_light_of_a_still_scene_go_on() {
+    // One lies on two rows of tiles of sixteen; the other changes the level by 2 at most.
+    let lamp = |key: u32, pixel: u32| {
+        let [x, y] = [pixel % SIDE, pixel / SIDE];
+        let lit = x < 112 && (48..64).contains(&y);
+        if lit { (60.0 * 1.05_f32.powi(key.cast_signed())) as u32 } else { 60 }
+    };
+    let dim = |key: u32, _: u32| 10 + 2 * key;
+    let scenes: [&dyn Fn(u32, u32) -> u32; 2] = [&lamp, &dim];
+    for (scene, percent) in scenes.into_iter().enumerate() {
+        let mut engine = stream(Method::Auto);
+        for turn in 0..16 {
+            let keys = KEYS as u32 + turn;
+            (1..=keys).for_each(|key| {
+                push(&mut engine, 25 * i64::from(key), |pixel| percent(key, pixel), false);
+            });
+            let newest = 25 * i64::from(keys);
+            let [now, next] = [newest, newest + 25].map(|at_ms| frame(&mut engine, at_ms));
+            assert!(now != next, "scene {scene}, after {keys} keys");
+            engine = stream(Method::Auto);
+        }
+    }
 }
 
 #[cfg(feature = "gpu")]
