@@ -223,7 +223,10 @@ fn parse_real<T: FromStr>(text: &str) -> Result<T, String> {
 }
 
 /// Reads a whole number; which ones may be is checked with all else.
-fn parse_whole<T: FromStr>(text: &str) -> Result<T, String> {
+///
+/// # Errors
+/// What was expected and what was found.
+pub fn parse_whole<T: FromStr>(text: &str) -> Result<T, String> {
     text.parse().map_err(|_| {
         let is_whole = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
         let expected = if is_whole { "a smaller number" } else { "a whole number of 0 or more" };

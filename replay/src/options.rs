@@ -7,7 +7,7 @@ use std::num::NonZeroUsize;
 
 use foreframe_fixtures::SceneInfo;
 
-pub use foreframed::config::parse_count;
+pub use foreframed::config::{parse_count, parse_whole};
 
 /// Reads a number of `least` to `most`.
 pub fn number(

@@ -50,7 +50,7 @@ fn a_file_that_is_not_there_is_no_wrong_usage_and_is_told_once() {
     let output = foreframe().args(["info", "no-such-file.mcap"]).output().unwrap();
     let errors = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(1), "{errors}");
-    assert_eq!(errors.matches("No such file").count(), 1, "{errors}");
+    assert_eq!(errors.matches("expected a capture, found no such file").count(), 1, "{errors}");
 }
 
 #[test]
@@ -71,7 +71,7 @@ fn what_is_no_capture_is_told_in_one_line_that_says_what_was_found() {
     fs::write(at("begun"), &whole[..20]).unwrap();
     let commands = ["info", "replay", "score --ratio 2", "export -o out"];
     let files = [
-        ("missing", "No such file"),
+        ("missing", "expected a capture, found no such file"),
         ("folder", "expected a capture, found a folder"),
         ("empty", "expected an MCAP file"),
         ("text", "found [74, 68, 69, 73"),

@@ -14,6 +14,12 @@ pub enum CaptureError {
         /// Why.
         source: std::io::Error,
     },
+    /// There is no file to read.
+    #[error(
+        "expected a capture, found no such file: `foreframe scenes NAME -o FILE.mcap` makes one of a \
+         built-in scene, `foreframed --record FILE.mcap` of an application"
+    )]
+    Missing,
     /// A folder where a file should be.
     #[error(
         "expected a capture, found a folder: `foreframe import` makes a capture of EXR frames in one"

@@ -5,6 +5,7 @@
 //! frame that comes out of here is bit for bit what was recorded, or it is an error.
 
 use std::fs::File;
+use std::io::ErrorKind;
 use std::path::Path;
 
 use foreframe_protocol::{Body as _, CreateStream, PlaneKind, StreamFormat, Submit};
@@ -97,7 +98,10 @@ impl Capture {
     /// stream was described.
     pub fn open(path: &Path) -> Result<Self, CaptureError> {
         let cannot_open = |source| CaptureError::Open { path: path.to_owned(), source };
-        let file = File::open(path).map_err(cannot_open)?;
+        let file = File::open(path).map_err(|error| match error.kind() {
+            ErrorKind::NotFound => CaptureError::Missing,
+            _ => cannot_open(error),
+        })?;
         if file.metadata().map_err(cannot_open)?.is_dir() {
             return Err(CaptureError::Folder);
         }

@@ -60,6 +60,9 @@ fn what_is_no_number_is_told_what_was_expected() {
             && error.contains("found `some`");
         assert!(is_told, "{error}");
     }
+    let line = ["foreframed", "--memory-mb", "99999999999999999999"];
+    let error = Command::try_parse_from(line).unwrap_err().to_string();
+    assert!(error.contains("expected a smaller number, found `9999"), "{error}");
 }
 
 #[test]

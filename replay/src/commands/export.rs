@@ -7,6 +7,7 @@ use foreframed::capture::Capture;
 use serde::Serialize;
 
 use crate::exr_frames::export;
+use crate::options::parse_whole;
 use crate::output::Output;
 use crate::recording::capture::warnings;
 
@@ -20,7 +21,8 @@ pub struct Args {
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
     /// Which stream of the capture, counted from 0.
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse_whole::<usize>)]
+    #[arg(allow_negative_numbers = true)]
     pub stream: usize,
 }
 

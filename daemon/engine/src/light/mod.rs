@@ -13,20 +13,20 @@
 //! (4) g(y, p) = 2^(min(p, 1) t(y - v p))       at phase p; v the motion of the tile
 //! ```
 //!
-//! c' is the change that the key before has shown, per span of the newest, along with the surfaces, and c'_s what moved by
-//! s tiles over them since, 2 per axis at most: the s of the largest R. A change stays where a lamp
-//! grows brighter, and moves with the edge of a shadow. R^2 is the part of the change that was
-//! foreseen: none where light flickers, or where a change is noise or news. The picture is then made
-//! brighter by g ([`relight`]), which lies between tiles linearly. A half float is a logarithm
-//! already: c and t p are differences of its codes.
+//! c' is the change that the key before has shown, per span of the newest, along with the surfaces,
+//! and c'_s what moved by s tiles over them since, 2 per axis at most: the s of the largest R. A
+//! change stays where a lamp grows brighter, and moves with the edge of a shadow. R^2 is the part of
+//! the change that was foreseen: none where light flickers, or where a change is noise or news. The
+//! picture is then made brighter by g ([`relight`]), which lies between tiles linearly. A half float
+//! is a logarithm already: c and t p are differences of its codes.
 //!
 //! Only surfaces that both keys show are compared, and only in tiles that move as one, so that
 //! something bright that comes in front of something dark is no light; and a tile that has half of
 //! the change around it alone is none either. Nothing is known where flow explains what motion does
 //! not, where a tile is not shown to go as it came (it is held, or damped), without depth, and after
-//! a cut. One row of tiles in eight is measured, in turn, and those near rows in
-//! which light has changed. Floats as in [`crate::trajectory`], quantised before a pixel is touched;
-//! made on the CPU whatever the backend. Exactness: `Exact`.
+//! a cut. One row of tiles in eight is measured, in turn, and those near rows in which light has
+//! changed. Floats as in [`crate::trajectory`], quantised before a pixel is touched; made on the CPU
+//! whatever the backend. Exactness: `Exact`.
 
 mod change;
 pub mod relight;
@@ -176,7 +176,8 @@ impl Light {
                 continue;
             }
             let most = changes.iter().max_by(|a, b| a.octaves.abs().total_cmp(&b.octaves.abs()));
-            let down = displacement(most.map_or(Velocity::default(), |it| it.motion), Phase::ONE)[1];
+            let down =
+                displacement(most.map_or(Velocity::default(), |it| it.motion), Phase::ONE)[1];
             let goes_to = row.saturating_add_signed((down / (TILE as i32 * 256)) as isize);
             for row in [row, goes_to.min(rows - 1)] {
                 self.watched[row.saturating_sub(NEAR)..(row + NEAR + 1).min(rows)].fill(true);

@@ -16,7 +16,7 @@ use foreframe_engine::pacing::{PacerConfig, RefreshKind, WorkEstimate};
 use serde::Serialize;
 
 use super::plot;
-use crate::options::{number, whole};
+use crate::options::{number, parse_whole, whole};
 use crate::output::Output;
 
 /// Jitter of synthesis times around `--work-ms`, +-: what a loaded two-core machine shows.
@@ -69,7 +69,8 @@ pub struct Args {
     #[arg(value_parser = number(0.0, 1000.0), allow_negative_numbers = true)]
     work_ms: f64,
     /// Where chance comes from, a whole number of 0 or more.
-    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = parse_whole::<u64>)]
+    #[arg(allow_negative_numbers = true)]
     seed: u64,
     /// Run this pacer and those of others through fixed traces instead, and print a table; of the
     /// other options, `--seconds` and `--seed` apply to it.

@@ -86,7 +86,8 @@ fn auto_that_was_chosen_while_it_ran_learns_it_anew() {
     engine.set_method(Method::Auto, None);
     let [now, .., next] = brightness(&mut engine);
     assert_eq!(now, next);
-    (1..=KEYS).for_each(|key| push_lit(&mut engine, 25 * (key + KEYS), 100 + 8 * key as u32, false));
+    (1..=KEYS)
+        .for_each(|key| push_lit(&mut engine, 25 * (key + KEYS), 100 + 8 * key as u32, false));
     let newest = 50 * KEYS;
     let sum = |engine: &mut Engine, at_ms| frame(engine, at_ms).into_iter().map(u32::from).sum();
     let [now, next]: [u32; 2] = [newest, newest + 25].map(|at_ms| sum(&mut engine, at_ms));
