@@ -26,7 +26,7 @@ const TORN: u16 = 24;
 /// the same in many.
 const NOTICED: f32 = 0.03;
 const NOTICED_TOGETHER: f32 = 0.5;
-/// How far what a tile is shown to do may be from what it did, pixels.
+/// How far what a tile is shown to do may be from what it did, pixels per motion span.
 const OTHERWISE_PX: f32 = 1.0;
 /// Added to luma of integer formats, per sample: noise in the dark is no change of light.
 const DARK: u32 = 4;
@@ -144,10 +144,12 @@ impl Comparison<'_> {
         };
         let valid = self.key.valid;
         let (rows, columns) = (samples(row, valid.height), samples(column, valid.width));
-        let lines = rows.map(|y| self.came().row(self.map.y.cell_of(y)));
-        let cells = columns.map(|x| self.map.x.cell_of(x) as usize);
-        let velocities = lines.map(|line| cells.map(|cell| line[cell]));
-        if is_torn(velocities.as_flattened()) || self.goes_otherwise([columns[0], rows[0]]) {
+        let lines = rows.map(|y| self.map.y.cell_of(y));
+        let cells = columns.map(|x| self.map.x.cell_of(x));
+        let velocities =
+            lines.map(|y| self.came().row(y)).map(|line| cells.map(|x| line[x as usize]));
+        let first = [cells[0], lines[0]];
+        if is_torn(velocities.as_flattened()) || self.goes_otherwise(first, velocities[0][0]) {
             return sums;
         }
         for (y, velocities) in rows.into_iter().zip(velocities) {
@@ -162,20 +164,17 @@ impl Comparison<'_> {
         sums
     }
 
-    /// Whether a pixel is not shown where its motion leads, or did not come by what is known of it:
-    /// it is held as nothing explains its motion, or too fast for any eye.
+    /// Whether what is at a cell, which `came` so far, is not shown to go on so, or did not come so:
+    /// it is held as nothing explains its motion, or damped as no eye can follow it.
     #[inline(always)]
-    fn goes_otherwise(&self, [x, y]: [u32; 2]) -> bool {
-        let Self { key, map, .. } = self;
-        let cell = [map.x.cell_of(x), map.y.cell_of(y)];
-        let came = self.came().at(cell[0], cell[1]);
-        let moved = [came.x, came.y].map(|v| f32::from(v) / f32::from(Velocity::PER_PX as i16));
-        let is_far = |by: [f32; 2]| by[0].abs().max(by[1].abs()) > OTHERWISE_PX;
-        let is_held = key.velocity.at(cell[0], cell[1]) == Velocity::default() && is_far(moved);
-        let told = || key.displacement.at(cell[0], cell[1]);
-        let is_damped = !key.displacement.data().is_empty() && {
-            let [dx, dy] = told();
-            is_far([dx - moved[0], dy - moved[1]])
+    fn goes_otherwise(&self, [x, y]: [u32; 2], came: Velocity) -> bool {
+        let came_px = [came.x, came.y].map(|v| f32::from(v) / Velocity::PER_PX as f32);
+        let is_far = |[dx, dy]: [f32; 2]| dx.abs().max(dy.abs()) > OTHERWISE_PX;
+        let is_held = self.key.velocity.at(x, y) == Velocity::default() && is_far(came_px);
+        let displacement = &self.key.displacement;
+        let is_damped = !displacement.data().is_empty() && {
+            let [dx, dy] = displacement.at(x, y);
+            is_far([dx - came_px[0], dy - came_px[1]])
         };
         is_held || is_damped
     }

@@ -2,7 +2,7 @@
 
 use super::relight::relight;
 use super::*;
-use crate::color::{ColorPlane, Rgba8, Texel};
+use crate::color::{ColorPlane, OrderedRgba16, Rgba8, Texel, half_to_ordered};
 use crate::plane::Rect;
 use crate::testing::{hash, key as key_of, map_of, plane, pool, px};
 use crate::time::MonoTime;
@@ -136,6 +136,60 @@ fn what_is_not_shown_to_go_as_it_came_has_no_light_of_its_own() {
         key.displacement = plane(SIZE[0], SIZE[1], |_, _| [PAN as f32, 0.0]);
     }
     assert!(after(&damped).gains(&pool(2), Phase::ONE).is_some());
+}
+
+#[test]
+fn light_runs_into_rows_that_nobody_has_looked_at() {
+    // Six rows of tiles grow brighter while all moves down by five.
+    const DOWN: u32 = 5 * TILE;
+    let size = [64, 640];
+    let key = |index: u32| {
+        let lit = |y: u32| (DOWN * index..DOWN * index + 6 * TILE).contains(&y);
+        let level = |x: u32, y: u32| {
+            let texture = 60 + hash(x / 4, (y + 1000 - DOWN * index) / 4, 7) % 60;
+            (texture as f32 * if lit(y) { 1.0 + 0.09 * index as f32 } else { 1.0 }) as u32
+        };
+        let color = plane(size[0], size[1], |x, y| Rgba8(0xff00_0000 | (0x01_01_01 * level(x, y))));
+        let depth = plane(size[0], size[1], |_, _| 1 << 20);
+        let velocity = plane(size[0], size[1], |_, _| px(0.0, DOWN as f32));
+        let time = |index: u32| MonoTime::from_ns(1_000_000_000 + 25_000_000 * u64::from(index));
+        KeyFrame {
+            content_time: time(index),
+            motion_from: Some(time(index.saturating_sub(1))),
+            ..key_of(ColorPlane::Rgba8(color), depth, velocity)
+        }
+    };
+    let keys: Vec<KeyFrame> = (0..TURNS + 4).map(key).collect();
+    let mut light = after(&keys);
+    let gains = light.gains(&pool(2), Phase::ONE).unwrap();
+    let first = 5 * keys.len() as u32;
+    let grown = |row: u32| gains.at(gains.width() / 2, row) > 4096;
+    // Those at the edges are judged with others that do not change.
+    let lit: Vec<u32> = (0..gains.height()).filter(|row| grown(*row)).collect();
+    assert!((first + 1..first + 5).all(grown), "lit {lit:?}, from {first} on");
+    assert!(!grown(first - 2) && !grown(first + 8), "lit {lit:?}, from {first} on");
+}
+
+#[test]
+fn noise_in_the_dark_of_half_floats_is_no_change_of_light() {
+    let noisy = |index: u32, least: u16, most: u16| {
+        let code = |x: u32, y: u32| if hash(x, y, index).is_multiple_of(2) { least } else { most };
+        let texel = |x: u32, y: u32| OrderedRgba16([code(x, y); 4].map(half_to_ordered));
+        let color = ColorPlane::Rgba16f(plane(SIZE[0], SIZE[1], texel));
+        KeyFrame { color, ..key(index, |_, _| 1.0) }
+    };
+    let changes = |least: u16, most: u16| {
+        let [then, now] = [0, 1].map(|index| noisy(index, least, most));
+        let map = map_of(&now);
+        let comparison = Comparison::new(&now, &then, &map).unwrap();
+        let mut changes = Plane::default();
+        changes.resize(SIZE[0] / TILE, SIZE[1] / TILE);
+        measure(&pool(2), &comparison, &[true; (SIZE[1] / TILE) as usize], &mut changes);
+        changes.data().iter().filter(|change| change.octaves != 0.0).count()
+    };
+    // 0 and 0.0005; then a quarter and a half.
+    assert_eq!(changes(0, 0x1019), 0);
+    assert!(changes(0x3400, 0x3800) > 50, "there is something to see");
 }
 
 #[test]
