@@ -17,7 +17,7 @@ pub enum CaptureError {
     /// There is no file to read.
     #[error(
         "expected a capture, found no such file: `foreframe scenes NAME -o FILE.mcap` makes one of a \
-         built-in scene, `foreframed --record FILE.mcap` of an application"
+         built-in scene, `foreframe serve --record FILE.mcap` of an application"
     )]
     Missing,
     /// A folder where a file should be.
