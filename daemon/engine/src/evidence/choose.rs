@@ -6,6 +6,7 @@ use rayon::ThreadPool;
 
 use super::{Lead, MIXED, PerRung, RUNGS, Sample, bit_of, index_of, unproven};
 use crate::bands::for_each_row;
+use crate::lanes::both;
 use crate::plane::Plane;
 use crate::trajectory::camera_path::CameraOrder;
 use crate::trajectory::rung::Rung;
@@ -104,12 +105,14 @@ fn total(pool: &ThreadPool, samples: &Plane<Sample>) -> (PerRung, f32) {
 }
 
 /// Whether the rung of a sample goes without saying: [`Rung::Linear`] or [`Rung::Hold`], which has
-/// met some keys to a tenth of a pixel, while the cheaper ones have not met them at all.
+/// met some keys to a tenth of a pixel, this one along both axes, while the cheaper ones have not
+/// met them at all.
 #[inline(always)]
 fn is_settled(sample: &Sample) -> bool {
     let index = index_of(sample.lead.rung);
     let cheaper = &sample.mean[..index.min(index_of(Rung::Linear))];
     sample.keys > 1
+        && sample.share == [Lead::WHOLE; 2]
         && index <= index_of(Rung::Linear)
         && sample.mean[index] <= TOLERANCE
         && cheaper.iter().all(|mean| *mean > CLEARLY)
@@ -135,7 +138,7 @@ pub(super) fn share(
             let mut bits = 0;
             for (whole, lead) in whole.iter_mut().zip(leads.row(row)) {
                 bits |= bit_of(lead.rung);
-                *whole = if lead.share == Lead::WHOLE { index_of(lead.rung) as u8 } else { MIXED };
+                *whole = if lead.is_whole() { index_of(lead.rung) as u8 } else { MIXED };
             }
             taken.fetch_or(bits, Ordering::Relaxed);
         },
@@ -172,8 +175,8 @@ struct Score {
     score: PerRung,
     /// Of how many samples.
     count: f32,
-    /// The share of its motion that goes on.
-    share: u8,
+    /// As [`Lead::share`].
+    share: [u8; 2],
 }
 
 /// One of so many samples of a surface has at least to have motion that is news: a surface jumps as
@@ -183,7 +186,7 @@ const NEWS_OF: u32 = 2;
 /// [`Score`] at one sample; None where nothing is known of the surface.
 #[inline(always)]
 fn score(samples: &Plane<Sample>, column: u32, row: u32) -> Option<Score> {
-    let (mut news, mut shares) = (0, 0);
+    let (mut news, mut shares) = ([0; 2], [0; 2]);
     let depth = samples.row(row)[column as usize].depth;
     let (mut sum, mut count) = (PerRung::default(), 0.0);
     let last = [samples.width() - 1, samples.height() - 1];
@@ -195,14 +198,19 @@ fn score(samples: &Plane<Sample>, column: u32, row: u32) -> Option<Score> {
                     *sum += mean;
                 }
                 count += 1.0;
-                news += u32::from(sample.share < Lead::WHOLE);
-                shares += if sample.share < Lead::WHOLE { u32::from(sample.share) } else { 0 };
+                for axis in 0..2 {
+                    let share = sample.share[axis];
+                    news[axis] += u32::from(share < Lead::WHOLE);
+                    shares[axis] += if share < Lead::WHOLE { u32::from(share) } else { 0 };
+                }
             }
         }
     }
-    let is_news = news > 0 && (NEWS_OF * news) as f32 >= count;
     #[expect(clippy::cast_possible_truncation, reason = "the mean of sixteenths")]
-    let share = if is_news { (shares / news) as u8 } else { Lead::WHOLE };
+    let share = both(|axis| {
+        let is_news = news[axis] > 0 && (NEWS_OF * news[axis]) as f32 >= count;
+        if is_news { (shares[axis] / news[axis]) as u8 } else { Lead::WHOLE }
+    });
     (count > 0.0).then(|| {
         for sum in &mut sum {
             *sum /= count;

@@ -10,7 +10,7 @@ use rayon::ThreadPool;
 use super::{Lead, PerRung, RUNGS, STRIDE, Sample, WORLD, index_of};
 use crate::bands::for_each_row_of_two;
 use crate::key::KeyFrame;
-use crate::lanes::LANES;
+use crate::lanes::{LANES, both};
 use crate::plane::Plane;
 use crate::trajectory::camera_path::CameraOrder;
 use crate::trajectory::flow::FailedField;
@@ -60,6 +60,9 @@ pub(super) struct Trace {
     /// Where the rung in use had said that it would be by now.
     foreseen: [f32; 2],
 }
+
+/// How far every rung was off, pixels.
+type OffPerRung = [[f32; 2]; RUNGS.len()];
 
 /// Errors of the camera's orders over samples that move with the world, and their number.
 pub(super) type OrderSums = [f32; CameraOrder::ALL.len() + 1];
@@ -148,13 +151,14 @@ impl Measuring<'_> {
                     continue;
                 }
                 let Seen { d, is_flow, .. } = self.seen(known, column, row);
-                let now = all_errors(known, trace.cell, d);
+                let off = all_off(known, trace.cell, d);
                 let moves_with_world = !is_flow && is_still(column, row);
                 // What the camera's poses explain is no jump of a surface, and no wrong vector; and
                 // what flow does says nothing of the surface's own motion.
                 if !moves_with_world && !is_flow {
-                    sample.share = share(d, trace.foreseen, &now);
+                    sample.share = share(d, trace.foreseen, &off);
                 }
+                let now = errors(&off, sample.share);
                 let history = self.history(trace.cell, sample.depth);
                 self.take_in(sample, history, &now, |_| true);
                 if moves_with_world {
@@ -307,28 +311,34 @@ impl Measuring<'_> {
     }
 }
 
-/// The part of the motion `d` that was foreseen, in sixteenths, where every rung's error is more
-/// than half of it.
+/// The part of the motion `d` that was foreseen along each axis, in sixteenths, where what every
+/// rung is `off` makes it news.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "0 to 16")]
 #[expect(clippy::cast_sign_loss, reason = "0 to 16")]
-fn share(d: [f32; 2], foreseen: [f32; 2], now: &PerRung) -> u8 {
-    let square = d[0] * d[0] + d[1] * d[1];
-    let least = now.iter().fold(1.0_f32, |least, error| least.min(*error));
-    // e^2 of (2).
-    let off = least * CONTRAST_PX * CONTRAST_PX / (1.0 - least).max(f32::MIN_POSITIVE);
+fn share(d: [f32; 2], foreseen: [f32; 2], off: &OffPerRung) -> [u8; 2] {
+    let least = |off: &[[f32; 2]], square: fn(&[f32; 2]) -> f32| {
+        off.iter().map(square).fold(f32::INFINITY, f32::min)
+    };
     // Written so that NaN fails it.
-    let is_news = off > NEWS_PX * NEWS_PX && off > NEWS * NEWS * square;
-    if !is_news {
-        return Lead::WHOLE;
-    }
-    let part = (d[0] * foreseen[0] + d[1] * foreseen[1]) / square;
-    (part.clamp(0.0, 1.0) * f32::from(Lead::WHOLE) + 0.5) as u8
+    let is_news = |off: f32, part: f32, d: f32| off > NEWS_PX * NEWS_PX && off >= part * part * d;
+    let all = is_news(least(off, |[x, y]| x * x + y * y), NEWS, d[0] * d[0] + d[1] * d[1]);
+    let moving = &off[HOLD + 1..];
+    let along = [least(moving, |[x, _]| x * x), least(moving, |[_, y]| y * y)];
+    both(|axis| {
+        let part = if all { NEWS } else { NEWS_ALONE };
+        if !is_news(along[axis], part, d[axis] * d[axis]) {
+            return Lead::WHOLE;
+        }
+        ((foreseen[axis] / d[axis]).clamp(0.0, 1.0) * f32::from(Lead::WHOLE) + 0.5) as u8
+    })
 }
 
-/// Part of a motion beyond which its error makes it news: there is more of it that nobody foresaw
-/// than somebody did.
+/// Part of a motion from which on its error makes it news: nobody foresaw more of it than somebody
+/// did.
 const NEWS: f32 = 0.5;
+/// The same along one axis where the whole is none: it would rather have been held.
+const NEWS_ALONE: f32 = 1.0;
 /// And the least error, pixels: half of [`CONTRAST_PX`].
 const NEWS_PX: f32 = 1.0;
 
@@ -364,19 +374,31 @@ fn predicted(predictions: &Predictions<'_>, rung: Rung, [x, y]: [u16; 2]) -> Opt
     curve.map(|curve| curve.at(*phase))
 }
 
-/// (1) and (2) of every rung. A rung without an answer is the motion field; one that was not
-/// prepared is no good.
+/// Where every rung had said that the surface at a cell would be by now, from where it is, pixels.
+/// A rung without an answer is the motion field; one that was not prepared is no good.
 #[inline(always)]
-fn all_errors(predictions: &Predictions<'_>, cell: [u16; 2], d: [f32; 2]) -> PerRung {
+fn all_off(predictions: &Predictions<'_>, cell: [u16; 2], d: [f32; 2]) -> OffPerRung {
     let [x, y] = cell.map(u32::from);
     let straight = straight(predictions, x, y);
-    let mut errors = [1.0; RUNGS.len()];
-    for (error_of, rung) in errors.iter_mut().zip(RUNGS) {
-        if predictions.models.has(rung) {
-            *error_of = error(predicted(predictions, rung, cell).unwrap_or(straight), d);
+    RUNGS.map(|rung| {
+        if !predictions.models.has(rung) {
+            return [f32::INFINITY; 2];
         }
-    }
-    errors
+        let predicted = predicted(predictions, rung, cell).unwrap_or(straight);
+        both(|axis| predicted[axis] - d[axis])
+    })
+}
+
+/// (1) and (2) of every rung. Those that follow the motion of a surface are judged along one axis,
+/// where of the other not all of it goes on.
+#[inline(always)]
+fn errors(off: &OffPerRung, share: [u8; 2]) -> PerRung {
+    let goes = share.map(|share| share == Lead::WHOLE);
+    let is_one = goes[0] != goes[1];
+    std::array::from_fn(|rung| {
+        let skips = |axis: usize| is_one && !goes[axis] && rung >= LINEAR;
+        contrast(both(|axis| if skips(axis) { 0.0 } else { off[rung][axis] }))
+    })
 }
 
 /// Where the motion of a cell had said that it would be by now.
@@ -389,7 +411,12 @@ fn straight(predictions: &Predictions<'_>, x: u32, y: u32) -> [f32; 2] {
 /// (1) and (2).
 #[inline(always)]
 pub(super) fn error(predicted: [f32; 2], d: [f32; 2]) -> f32 {
-    let (dx, dy) = (predicted[0] - d[0], predicted[1] - d[1]);
+    contrast(both(|axis| predicted[axis] - d[axis]))
+}
+
+/// (2).
+#[inline(always)]
+fn contrast([dx, dy]: [f32; 2]) -> f32 {
     let square = dx * dx + dy * dy;
     if square.is_finite() { square / (square + CONTRAST_PX * CONTRAST_PX) } else { 1.0 }
 }

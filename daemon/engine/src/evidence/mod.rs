@@ -18,9 +18,12 @@
 //! are to judge a surface by.
 //!
 //! Where the rungs have failed and most of a surface's motion is news, it may be a jump as well as
-//! a beginning: only that part of it goes on which was foreseen. That limits overshoot where
-//! something turns back, and a vector that is wrong for one key moves nothing. Wrong vectors that
-//! stay are found by luma ([`trust`]).
+//! a beginning: only that part of it goes on which was foreseen, along each axis of the picture for
+//! itself. The same holds of one axis alone along which holding would have been better than every
+//! rung: what shakes up and down as it drives by goes on across, and not up. The rungs that follow
+//! the motion are then judged by (1) along the other axis. That limits overshoot where something
+//! turns back, and a vector that is wrong for one key moves nothing. Wrong vectors that stay are
+//! found by luma ([`trust`]).
 //!
 //! A shadow, a reflection and a texture that runs move otherwise than the surface that shows them.
 //! Where luma says so of two keys in a row, and flow explains what their motion does not
@@ -104,26 +107,35 @@ fn unproven(image: Rung) -> Rung {
 pub struct Lead {
     /// The rung in use.
     pub rung: Rung,
-    /// Where most of its motion is news, the part of it that was foreseen, in sixteenths; else
-    /// [`Lead::WHOLE`].
-    pub share: u8,
+    /// By axis, where most of its motion is news, the part of it that was foreseen, in sixteenths;
+    /// else [`Lead::WHOLE`].
+    pub share: [u8; 2],
 }
 
 impl Lead {
-    /// The share of motion that goes on as it is.
+    /// The share of motion along an axis that goes on as it is.
     pub const WHOLE: u8 = 16;
 
     /// By `rung`, whole.
     #[must_use]
     pub const fn by(rung: Rung) -> Self {
-        Self { rung, share: Self::WHOLE }
+        Self { rung, share: [Self::WHOLE; 2] }
     }
 
-    /// The part of its motion that a surface goes on with, where that is not all of it.
+    /// Whether the rung takes the surface on along both axes.
     #[must_use]
     #[inline(always)]
-    pub fn part(self) -> Option<f32> {
-        (self.share < Self::WHOLE).then(|| f32::from(self.share) / f32::from(Self::WHOLE))
+    pub fn is_whole(self) -> bool {
+        self.share == [Self::WHOLE; 2]
+    }
+
+    /// The part of its motion along an axis that a surface goes on with, where that is not all of
+    /// it.
+    #[must_use]
+    #[inline(always)]
+    pub fn part(self, axis: usize) -> Option<f32> {
+        let share = self.share[axis];
+        (share < Self::WHOLE).then(|| f32::from(share) / f32::from(Self::WHOLE))
     }
 }
 
@@ -144,8 +156,8 @@ pub struct Sample {
     pub keys: u8,
     /// What led it so far.
     lead: Lead,
-    /// The share of its motion that goes on.
-    share: u8,
+    /// As [`Lead::share`], by this key alone.
+    share: [u8; 2],
 }
 
 impl Sample {
@@ -160,7 +172,7 @@ impl Default for Sample {
     /// Of nothing that is known.
     fn default() -> Self {
         let lead = Lead::default();
-        Self { mean: PerRung::default(), depth: 0, keys: 0, lead, share: Lead::WHOLE }
+        Self { mean: PerRung::default(), depth: 0, keys: 0, lead, share: lead.share }
     }
 }
 

@@ -257,7 +257,7 @@ fn what_jumps_goes_on_as_it_did_before_and_what_begins_to_move_waits_for_a_key()
     };
     let (ladder, jumped) = climbed(Method::Auto, keys(5));
     let x = at(4) as u32 + 12;
-    assert!(ladder.evidence().leads().at(x / STRIDE, 10).part().is_some());
+    assert!(ladder.evidence().leads().at(x / STRIDE, 10).part(0).is_some());
     let vx = f32::from(jumped.velocity.at(x, 44).x) / 32.0;
     assert!((vx - 3.0).abs() <= 1.5, "it went on by {vx} px");
     let (ladder, after) = climbed(Method::Auto, keys(6));
@@ -272,6 +272,36 @@ fn what_jumps_goes_on_as_it_did_before_and_what_begins_to_move_waits_for_a_key()
     });
     let (_, last) = climbed(Method::Auto, begins);
     assert_eq!(last.velocity.at(60, 44), Default::default());
+}
+
+#[test]
+fn what_shakes_as_it_drives_by_goes_on_across_by_its_rung_and_is_held_up_and_down() {
+    // It gains a pixel per key across, and turns back up and down with every key: most of its
+    // motion is news, or along one axis alone.
+    for speed in [9.5, 29.5] {
+        let keys = (0..6).map(|index| {
+            let (across, up) = (speed + index as f32, if index % 2 == 0 { 5.0 } else { -5.0 });
+            key(index, |_, _| FAR, move |x, y| [x as f32 - across, y as f32 - up])
+        });
+        let (ladder, last) = climbed(Method::Auto, keys);
+        let lead = ladder.evidence().leads().at(90 / STRIDE, 44 / STRIDE);
+        assert_eq!((lead.rung, lead.share), (Rung::Quadratic, [Lead::WHOLE, 0]));
+        let (velocity, acceleration) = (last.velocity.at(90, 44), last.acceleration.at(90, 44));
+        assert_eq!((velocity.y, acceleration.y), (0, 0));
+        let [v, a] = [velocity.x, acceleration.x].map(|part| f32::from(part) / 32.0);
+        assert!((v - speed - 5.5).abs() < 0.05 && (a - 1.0).abs() < 0.05, "{v} {a}");
+    }
+}
+
+#[test]
+fn an_axis_along_which_some_rung_is_nearer_than_holding_goes_on_whole() {
+    // Up and down it slows and hastens: most of its 5 px was not foreseen, yet some of it was.
+    let keys = (0..6).map(|index| {
+        let up = if index % 2 == 0 { 2.0 } else { 5.0 };
+        key(index, |_, _| FAR, move |x, y| [x as f32 - 12.0, y as f32 - up])
+    });
+    let (ladder, _) = climbed(Method::Auto, keys);
+    assert!(ladder.evidence().leads().at(60 / STRIDE, 44 / STRIDE).is_whole());
 }
 
 #[test]

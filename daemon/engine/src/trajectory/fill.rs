@@ -11,6 +11,7 @@ use super::lattice::STRIDE;
 use super::models::Models;
 use super::quadratic::Quadratic;
 use super::rung::Rung;
+use crate::evidence::Lead;
 use crate::key::{Acceleration, KeyFrame, Velocity};
 
 /// Cells of one step where the world is still.
@@ -124,22 +125,23 @@ impl Filling<'_> {
     #[inline(always)]
     fn each(&self, rung: Rung, run: &mut Run<'_>, cells: std::ops::Range<usize>) {
         for i in cells {
-            (run.velocity[i], run.acceleration[i]) = self.one(rung, run.x + i as u32, run.y);
+            (run.velocity[i], run.acceleration[i]) =
+                self.one(Lead::by(rung), run.x + i as u32, run.y);
         }
-    }
-
-    /// Takes one cell on by a part of its motion.
-    #[inline(always)]
-    pub(super) fn part_of_motion(&self, part: f32, x: u32, y: u32) -> (Velocity, Acceleration) {
-        let [dx, dy] = self.key.displacement.at(x, y);
-        damped(Curve::straight([dx * part, dy * part]), self.px_per_span).quantise()
     }
 
     /// Takes one cell on.
     #[inline(always)]
-    pub(super) fn one(&self, rung: Rung, x: u32, y: u32) -> (Velocity, Acceleration) {
-        let curve = self.models.curve(rung, self.key, self.older, x, y);
-        let curve = curve.unwrap_or_else(|| Curve::straight(self.key.displacement.at(x, y)));
+    pub(super) fn one(&self, lead: Lead, x: u32, y: u32) -> (Velocity, Acceleration) {
+        let straight = Curve::straight(self.key.displacement.at(x, y));
+        let curve = self.models.curve(lead.rung, self.key, self.older, x, y);
+        let mut curve = curve.unwrap_or(straight);
+        for axis in 0..2 {
+            if let Some(part) = lead.part(axis) {
+                curve.half[axis] = part * straight.half[axis];
+                curve.one[axis] = part * straight.one[axis];
+            }
+        }
         damped(curve, self.px_per_span).quantise()
     }
 }

@@ -413,9 +413,6 @@ fn fill_mixed(filling: &Filling<'_>, evidence: &Evidence, run: Run<'_>) {
             let depth = if has_depth { key.depth.at(x, run.y) } else { 0 };
             evidence.lead_at(x, run.y, depth)
         };
-        (*velocity, *acceleration) = match lead.part() {
-            Some(part) => filling.part_of_motion(part, x, run.y),
-            None => filling.one(lead.rung, x, run.y),
-        };
+        (*velocity, *acceleration) = filling.one(lead, x, run.y);
     }
 }

@@ -4,7 +4,7 @@ use rayon::ThreadPool;
 
 use super::{FULL, TILE};
 use crate::bands::for_each_row;
-use crate::evidence::{Evidence, Lead, STRIDE, index_of};
+use crate::evidence::{Evidence, STRIDE, index_of};
 use crate::field::FieldMap;
 use crate::key::{KeyFrame, Velocity};
 use crate::plane::Plane;
@@ -150,7 +150,7 @@ fn cost(evidence: &Evidence, columns: [usize; 2], rows: [usize; 2]) -> u8 {
     for row in within(rows, leads.height()) {
         for column in within(columns, leads.width()) {
             let (sample, lead) = (samples.at(column, row), leads.at(column, row));
-            if lead.share < Lead::WHOLE {
+            if !lead.is_whole() {
                 return FULL;
             }
             if sample.keys > 0 {
