@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    adapters, bench, completions, ctl, demo, doctor, export, import, info, man, pacing, perception,
-    replay, scenes, score, serve, stability, top,
+    adapters, bench, check, completions, ctl, demo, doctor, export, import, info, man, pacing,
+    perception, replay, scenes, score, serve, stability, top,
 };
 use crate::output::Output;
 use foreframed::UsageError;
@@ -49,6 +49,8 @@ pub enum Command {
     Replay(replay::Args),
     /// Predict left-out frames of captures and measure how far off the methods are.
     Score(score::Args),
+    /// Ask in CI whether a capture still gives the bytes and the quality that it gave.
+    Check(check::Args),
     /// Find out where methods fail: one knob at a time, on scenes that isolate one difficulty.
     Stability(stability::Args),
     /// Time the engine on built-in scenes, beside plain copies of the same bytes.
@@ -101,6 +103,7 @@ impl Cli {
             Command::Doctor(args) => doctor::run(&args, &output),
             Command::Replay(args) => replay::run(&args, &output),
             Command::Score(args) => score::run(&args, &output),
+            Command::Check(args) => check::run(&args, &output),
             Command::Stability(args) => stability::run(&args, &output),
             Command::Bench(args) => bench::run(&args, &output),
             Command::Adapters(args) => adapters::run(&args, &output),

@@ -5,6 +5,7 @@
 //! its arguments, call a library, and report.
 
 pub mod bench;
+pub mod check;
 pub mod cli;
 pub mod commands;
 pub mod demo;

@@ -30,6 +30,8 @@ fn wrong_usage_exits_with_2_and_names_option_and_value() {
         ("score x.mcap --ratio 1", ["2 or more", "1"]),
         ("score x.mcap --ratio 4 --methods hold,voxels", ["hold, blend", "voxels"]),
         ("score x.mcap --ratio 4 --threads -2", ["--threads", "-2"]),
+        ("check x.mcap", ["--baseline", "required"]),
+        ("check x.mcap --baseline x.json --ratio 4", ["--write", "required"]),
         ("pacing --drift-ppm 2000", ["-1000 to 1000", "2000"]),
         ("serve --refresh 0", ["--refresh", "found 0"]),
         ("serve --json", ["--json", "`serve`"]),
@@ -43,6 +45,45 @@ fn wrong_usage_exits_with_2_and_names_option_and_value() {
         }
         assert!(output.stdout.is_empty(), "{arguments}");
     }
+}
+
+#[test]
+fn a_check_passes_on_what_was_written_and_exits_with_1_when_something_regressed() {
+    let folder = tempfile::tempdir().unwrap();
+    let in_folder = |arguments: &str| {
+        let mut command = foreframe();
+        command.current_dir(&folder).args(arguments.split(' ')).output().unwrap()
+    };
+    let made = in_folder("scenes pan --size 64x36 --seconds 0.1 -o pan.mcap");
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    let missing = in_folder("check pan.mcap --baseline pan.json");
+    let said = String::from_utf8(missing.stderr).unwrap();
+    assert!(said.contains("pan.json: expected a baseline"), "{said}");
+    assert!(in_folder("check pan.mcap --baseline pan.json --write --ratio 3").status.success());
+    let passed = in_folder("check pan.mcap --baseline pan.json --threads 3 --junit pan.xml");
+    assert!(passed.status.success(), "{}", String::from_utf8_lossy(&passed.stderr));
+    let junit = fs::read_to_string(folder.path().join("pan.xml")).unwrap();
+    assert!(junit.contains("failures=\"0\"") && junit.contains("\"pan.auto\""), "{junit}");
+
+    // Of linear, not one digit of one digest is what it was.
+    let path = folder.path().join("pan.json");
+    let mut baseline: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
+    baseline["methods"][0]["digest"] = "0".repeat(32).into();
+    fs::write(&path, baseline.to_string()).unwrap();
+    let failed = in_folder("check pan.mcap --baseline pan.json --json --junit pan.xml");
+    assert_eq!(failed.status.code(), Some(1));
+    let found: serde_json::Value = serde_json::from_slice(&failed.stdout).unwrap();
+    assert_eq!(found["passed"], false);
+    assert_eq!(found["methods"][0]["digest"]["passed"], false);
+    assert_eq!(found["methods"][1]["digest"]["passed"], true);
+    let junit = fs::read_to_string(folder.path().join("pan.xml")).unwrap();
+    assert!(junit.contains("failures=\"1\""), "{junit}");
+    let other = in_folder("scenes atrium --size 64x36 --seconds 0.1 -o pan.mcap");
+    assert!(other.status.success());
+    let said = in_folder("check pan.mcap --baseline pan.json").stderr;
+    let said = String::from_utf8(said).unwrap();
+    assert!(said.contains("expected the capture that the baseline is of, `pan`"), "{said}");
 }
 
 #[test]

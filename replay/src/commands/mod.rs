@@ -2,6 +2,7 @@
 
 pub mod adapters;
 pub mod bench;
+pub mod check;
 pub mod completions;
 pub mod ctl;
 pub mod demo;

@@ -34,6 +34,8 @@ pub struct CaptureScore {
     pub ratio: usize,
     /// How many keys.
     pub keys: usize,
+    /// The digest of the true frames to predict, 32 hexadecimal digits.
+    pub truth_digest: String,
     /// Frames from a cut to the next key, which are not predicted.
     pub left_out: usize,
     /// Where the motion of the keys came from.
@@ -69,6 +71,8 @@ pub struct MethodScore {
     pub late_camera: bool,
     /// Predicted frames.
     pub frames: u64,
+    /// The digest of all of them, 32 hexadecimal digits: the same on every machine.
+    pub digest: String,
     /// See [`super::metrics::psnr_rgb_db`].
     pub psnr_rgb_db: Option<f64>,
     /// See [`super::metrics::psnr_y_db`].
@@ -314,6 +318,7 @@ pub(super) mod tests {
             backend: "cpu".to_owned(),
             interpolates: false,
             late_camera: false,
+            digest: String::new(),
             frames: 36,
             psnr_rgb_db: psnr,
             psnr_y_db: psnr,
@@ -337,6 +342,7 @@ pub(super) mod tests {
             height: 360,
             ratio: 3,
             keys: 13,
+            truth_digest: String::new(),
             left_out: 2,
             key_motion: MotionCounts { own: 1, composed: 10, missing: 2 },
             methods: vec![score(psnr)],
@@ -374,6 +380,7 @@ pub(super) mod tests {
         let mut expected = vec![
             "name",
             "backend",
+            "digest",
             "interpolates",
             "late_camera",
             "frames",

@@ -30,6 +30,7 @@ use super::tally::{FrameScore, MethodTally, Truth};
 use crate::recording::keys::KeyReader;
 use crate::recording::plan::{MotionSource, Plan};
 use crate::recording::{Frame, Recording, Wanted};
+use crate::virtual_time::digest::FrameDigester;
 
 /// What to score and how.
 #[derive(Clone, Debug)]
@@ -137,6 +138,7 @@ pub fn score_recording(
         height: format.height,
         ratio: options.ratio.get(),
         keys: plan.keys.len(),
+        truth_digest: truths.digester.all(),
         left_out: (0..plan.keys.len()).map(|key| plan.left_out(key)).sum(),
         key_motion: count_motion(&plan),
         methods: runs
@@ -257,7 +259,7 @@ impl MethodRun {
                 self.tally.add_late_camera();
             }
             let report = self.engine.synthesise(*time, output).context("the engine has no key")?;
-            self.tally.add_frame_work(report.work);
+            self.tally.add_frame(output, report.work);
         }
         Ok(())
     }
@@ -368,6 +370,7 @@ struct TruthReader {
     converter: SrgbConverter,
     engine: Engine,
     picture: ColorPlane,
+    digester: FrameDigester,
 }
 
 impl TruthReader {
@@ -376,7 +379,8 @@ impl TruthReader {
         let gpu = options.backends.first().and_then(Option::as_ref);
         let engine = engine_of(Method::Hold, gpu, format, &options);
         let converter = SrgbConverter::new(&format);
-        Self { converter, engine, picture: ColorPlane::Rgba8(Plane::default()) }
+        let picture = ColorPlane::Rgba8(Plane::default());
+        Self { converter, engine, picture, digester: FrameDigester::default() }
     }
 
     fn read(&mut self, recording: &mut dyn Recording, frame: usize) -> anyhow::Result<Srgb8> {
@@ -386,6 +390,7 @@ impl TruthReader {
         self.engine
             .synthesise(truth.content_time, &mut self.picture)
             .context("the engine has no key")?;
+        self.digester.add(&self.picture);
         Ok(to_srgb8(&self.picture, &self.converter))
     }
 }

@@ -1,12 +1,13 @@
 //! What one method reached on one recording: collected frame by frame, averaged at the end.
 
-use foreframe_engine::{Method, MonoSpan};
+use foreframe_engine::{ColorPlane, Method, MonoSpan};
 
 use super::metrics::flip::FlipTruth;
 use super::metrics::{ErrorPicture, TileTally, error_flicker, psnr_rgb_db, psnr_y_db, ssim};
 use super::picture::Srgb8;
 use super::report::{FramePoint, MethodScore};
 use super::retina::RetinaTally;
+use crate::virtual_time::digest::FrameDigester;
 
 /// A mean that grows.
 #[derive(Clone, Copy, Default, Debug)]
@@ -96,6 +97,7 @@ pub struct MethodTally {
     /// What the eye sees of it.
     pub retina: RetinaTally,
     frames: Vec<FramePoint>,
+    digester: FrameDigester,
 }
 
 impl MethodTally {
@@ -116,6 +118,7 @@ impl MethodTally {
             key_ms: Mean::default(),
             retina: RetinaTally::default(),
             frames: Vec::new(),
+            digester: FrameDigester::default(),
         }
     }
 
@@ -129,8 +132,9 @@ impl MethodTally {
         self.had_late_camera = true;
     }
 
-    /// Making a frame cost so much.
-    pub fn add_frame_work(&mut self, work: MonoSpan) {
+    /// This frame was made at such a cost.
+    pub fn add_frame(&mut self, frame: &ColorPlane, work: MonoSpan) {
+        self.digester.add(frame);
         self.frame_ms.add(work.as_ms_f64());
     }
 
@@ -175,6 +179,7 @@ impl MethodTally {
             interpolates: self.method.interpolates(),
             late_camera: self.had_late_camera,
             frames: self.psnr_y_db.count,
+            digest: self.digester.all(),
             psnr_rgb_db: self.psnr_rgb_db.value(),
             psnr_y_db: self.psnr_y_db.value(),
             psnr_y_by_phase_db: self.psnr_y_by_phase_db.iter().map(Mean::value).collect(),
