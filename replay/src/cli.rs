@@ -43,7 +43,7 @@ pub enum Command {
     Export(export::Args),
     /// Say what a capture holds and whether it is whole.
     Info(info::Args),
-    /// Look for what is wrong with a capture: its motion, and the bits of its colour.
+    /// Look for what is wrong with a capture, its motion and the bits of its colour, or this machine.
     Doctor(doctor::Args),
     /// Feed a capture through the engine and the pacer, on virtual time.
     Replay(replay::Args),

@@ -6,6 +6,7 @@ use std::io::{BufRead as _, BufReader, Write as _};
 use std::os::unix::net::UnixStream;
 
 use daemon_fixture::{Client, RunningDaemon};
+use foreframe_replay::doctor::machine::Facts;
 use foreframed::capture::Capture;
 use foreframed::control::{Controller, DaemonStatus, Request, Response, control_path};
 
@@ -48,6 +49,16 @@ fn show_until(
             return status;
         }
     }
+}
+
+#[test]
+fn the_doctor_finds_the_daemon_that_runs_and_says_where_none_does() {
+    let daemon = RunningDaemon::start("shm");
+    let found = Facts::gather(Some(&daemon.socket)).daemon;
+    let expected = format!("version {}, 0 streams", env!("CARGO_PKG_VERSION"));
+    assert_eq!(found, Ok(Some(expected)));
+    let elsewhere = daemon.socket.with_file_name("elsewhere.sock");
+    assert_eq!(Facts::gather(Some(&elsewhere)).daemon, Ok(None));
 }
 
 #[test]

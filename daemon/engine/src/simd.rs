@@ -31,6 +31,18 @@ impl Simd {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::Widest, Self::Avx2, Self::Portable];
 
+    /// What the widest registers are that kernels use on this processor, for people.
+    #[must_use]
+    pub fn widest_registers() -> &'static str {
+        #[cfg(target_arch = "x86_64")]
+        {
+            let names = [(has_avx512(), "AVX-512"), (has_avx2(), "AVX2"), (true, "SSE2")];
+            names.into_iter().find_map(|(has, name)| has.then_some(name)).unwrap_or_default()
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        "what the compiler does"
+    }
+
     /// Makes this the choice of the calling thread.
     pub(crate) fn enter(self) {
         SIMD.set(self);

@@ -24,6 +24,7 @@ use crate::sink::window::{WindowConfig, WindowOpener, WindowSystem};
 use crate::sink::worker::SinkWorker;
 use crate::stream::core::CoreConfig;
 use crate::stream::mailbox::Mailbox;
+use crate::stream::real_time;
 use crate::stream::reaper::Reaped;
 use crate::stream::thread::{self, StreamParts};
 use crate::stream::{FromStream, StreamEvent};
@@ -123,7 +124,7 @@ impl Server {
                     finish: viewed.finish,
                     keys_to_check: KEYS_TO_CHECK,
                     timer: clock::now,
-                    worker_started: thread::ask_for_real_time_work,
+                    worker_started: real_time::ask_for_work,
                     ..EngineConfig::new(config.method, config.threads)
                 },
                 refresh_interval: config.frame_interval(),

@@ -5,7 +5,7 @@
 //! pool ([`planes`]), drives the [`core`], and hands pictures to subscribers ([`outlet`]), to a
 //! sink, to the window ([`display`]) and key frames to the recorder. What it is told to do
 //! differently is a [`command`], what it notices about itself is [`observed`]. A picture that no key
-//! can wait for longer is [`owed`]. Whatever is slow to drop goes to the [`reaper`], and pools for
+//! can wait for longer is [`owed`]. Threads ask for [`real_time`] priority. Whatever is slow to drop goes to the [`reaper`], and pools for
 //! subscribers come from the [`allocator`].
 
 pub mod allocator;
@@ -19,6 +19,7 @@ pub mod observed;
 pub mod outlet;
 pub mod owed;
 pub mod planes;
+pub mod real_time;
 pub mod reaper;
 pub mod thread;
 

@@ -7,7 +7,7 @@
 //! or slots that can be full.
 
 use std::io;
-use std::sync::{Arc, Once};
+use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 
 use calloop::channel::Sender;
@@ -19,10 +19,6 @@ use foreframe_protocol::{
     CreateStream, ErrorCode, ErrorMessage, OutputFrame, OutputKind, Pacing, PlaneKind, Presented,
     Statistics, Submit,
 };
-use thread_priority::{
-    RealtimeThreadSchedulePolicy, ThreadPriority, ThreadPriorityValue, ThreadSchedulePolicy,
-    set_thread_priority_and_policy, thread_native_id,
-};
 use tracing::{debug, error, info, trace, warn};
 
 use super::command::StreamCommand;
@@ -33,7 +29,7 @@ use super::intake::Intake;
 use super::mailbox::{Mailbox, Submission, Taken, UiSubmission};
 use super::observed::{KeyInstants, Observed, PictureInstants, alternation};
 use super::owed::OwedPicture;
-use super::{FromStream, StreamEvent};
+use super::{FromStream, StreamEvent, real_time};
 use crate::clock::{self, Alarm, Woken};
 use crate::control::StreamStatus;
 use crate::gpu::Gpus;
@@ -48,8 +44,6 @@ use crate::sink::worker::SinkWorker;
 const REPEATS_BEFORE_IDLE: u32 = 120;
 /// Time between two reports of counts.
 const STATISTICS_INTERVAL: MonoSpan = MonoSpan::from_ms(250);
-/// Real-time priority, at the lower end: above every ordinary thread, below what drives devices.
-const REAL_TIME_PRIORITY: u8 = 10;
 
 /// Everything a stream's thread owns from the start.
 #[derive(Debug)]
@@ -188,7 +182,7 @@ impl StreamThread {
         if let Some(recorder) = &mut self.parts.recorder {
             recorder.announce(&self.parts.create);
         }
-        ask_for_real_time();
+        real_time::ask();
         let mailbox = Arc::clone(&self.parts.mailbox);
         loop {
             self.follow_commands();
@@ -592,33 +586,4 @@ impl Mean {
     fn mean_ns(&self) -> u64 {
         self.sum_ns.checked_div(self.count).unwrap_or(0)
     }
-}
-
-/// Asks for a priority that keeps wakes on time on a busy machine. Many machines do not grant it.
-fn ask_for_real_time() {
-    static SAID: Once = Once::new();
-    let asked = set_real_time(REAL_TIME_PRIORITY);
-    SAID.call_once(|| match asked {
-        Ok(()) => info!("streams run with real-time priority"),
-        Err(error) => info!(%error, "streams run without real-time priority"),
-    });
-}
-
-/// Asks the same for a thread that a stream waits for or hands its pictures to, as the engine's
-/// workers and the threads of surfaces: one below the stream's own.
-pub fn ask_for_real_time_work() {
-    if let Err(error) = set_real_time(REAL_TIME_PRIORITY - 1) {
-        debug!(%error, "a worker runs without real-time priority");
-    }
-}
-
-fn set_real_time(priority: u8) -> Result<(), thread_priority::Error> {
-    let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
-    let priority = ThreadPriorityValue::try_from(priority)
-        .expect("the value is below 100, the highest that there is");
-    set_thread_priority_and_policy(
-        thread_native_id(),
-        ThreadPriority::Crossplatform(priority),
-        policy,
-    )
 }

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 
 use foreframed::config::read_profile;
 
+use super::ctl::SocketArgs;
+use crate::doctor::machine::{Facts, examine_machine};
 use crate::doctor::{Examination, Report, examine_file};
 use crate::options::{number, parse_count};
 use crate::output::Output;
@@ -12,45 +14,59 @@ use crate::output::Output;
 /// Arguments of `foreframe doctor`.
 #[derive(clap::Args, Debug)]
 #[command(after_help = "\
-Every way of reading the motion plane is tried on the first keys that move: as declared, with an axis
-flipped, in the other direction, half and twice as long, in another unit, with the camera's motion and
-with the jitter of the projection. What a key shows is compared with what the frame before has shown
-where the motion says that it came from.
+Without a capture: what a daemon would find on this machine, and what would make it better.
 
-Smooth gradients are looked for in the last of these keys, and the fewest bits at which their steps are
-hardly seen on the display at the distance that --ppd means.
+With one: every way of reading the motion plane is tried on the first keys that move: as
+declared, with an axis flipped, in the other direction, half and twice as long, in another unit,
+with the camera's motion and with the jitter of the projection. What a key shows is compared with
+what the frame before has shown where the motion says that it came from.
 
-Exit code 1: the motion looks wrong.")]
+Smooth gradients are looked for in the last of these keys, and the fewest bits at which their
+steps are hardly seen on the display at the distance that --ppd means.
+
+Exit code 1: the motion looks wrong, or a daemon cannot run here.")]
 pub struct Args {
-    /// Capture to look into.
+    /// Capture to look into [default: this machine]
     #[arg(value_name = "FILE.mcap")]
-    pub file: PathBuf,
+    pub file: Option<PathBuf>,
+    /// Which daemon to look for, without a capture.
+    #[command(flatten)]
+    pub socket: SocketArgs,
     /// Keys to look at, the first that move
-    #[arg(long, value_name = "N", default_value = "8")]
+    #[arg(long, value_name = "N", default_value = "8", requires = "file")]
     #[arg(value_parser = parse_count, allow_negative_numbers = true)]
     pub keys: NonZeroUsize,
     /// Pixels per degree, 1 to 1000.
     #[arg(long, value_name = "PPD", default_value_t = 52.0, value_parser = number(1.0, 1000.0))]
-    #[arg(allow_negative_numbers = true)]
+    #[arg(allow_negative_numbers = true, requires = "file")]
     pub ppd: f64,
     /// Display: a built-in profile (see `perception displays`) or a file that ends in .toml.
-    #[arg(long, value_name = "NAME", default_value = "asus-pg279q")]
+    #[arg(long, value_name = "NAME", default_value = "asus-pg279q", requires = "file")]
     pub profile: String,
 }
 
 /// Runs the command.
 ///
 /// # Errors
-/// If the capture cannot be read or has no motion, or its motion looks wrong.
+/// If the capture cannot be read or has no motion, or its motion looks wrong; without one, if a
+/// daemon cannot run here.
 pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
+    let Some(file) = &args.file else {
+        let report = examine_machine(&Facts::gather(args.socket.socket.as_deref()));
+        output.result(&report, &report.to_text())?;
+        return match report.wrong() {
+            0 => Ok(()),
+            wrong => anyhow::bail!("{wrong} of these keep a daemon from running"),
+        };
+    };
     let profile = read_profile(&args.profile)?;
     let keys = u32::try_from(args.keys.get()).unwrap_or(u32::MAX);
     let examination = Examination { keys, ppd: args.ppd, profile: &profile };
-    let report = examine_file(&args.file, &examination)?;
+    let report = examine_file(file, &examination)?;
     output.result(&report, &text(&report))?;
     match report.motion.verdict {
         None => Ok(()),
-        Some(verdict) => anyhow::bail!("{}: {verdict}", args.file.display()),
+        Some(verdict) => anyhow::bail!("{}: {verdict}", file.display()),
     }
 }
 

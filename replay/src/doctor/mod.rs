@@ -1,7 +1,8 @@
 //! Looks for what is wrong with a capture: its motion, by the engine's own check, and the bits of
-//! its colours, by the banding model.
+//! its colours, by the banding model. Without one, with the [`machine`].
 
 mod gradients;
+pub mod machine;
 
 use std::path::Path;
 

@@ -33,7 +33,7 @@ use super::pane::Pane;
 use super::shared::Shared;
 use super::wayland::Face;
 use crate::stream::core::Told;
-use crate::stream::thread::ask_for_real_time_work;
+use crate::stream::real_time;
 pub(super) use again::Losses;
 use output::Output;
 use pass::Picture;
@@ -264,7 +264,7 @@ impl Life {
         make: impl FnOnce(Arc<Shared>) -> Result<Output, SurfaceError>,
         tell: &SyncSender<Result<String, SurfaceError>>,
     ) {
-        ask_for_real_time_work();
+        real_time::ask_for_work();
         let mut output = match make(Arc::clone(&self.shared)) {
             Ok(output) => output,
             // Whoever asked may have given up.
