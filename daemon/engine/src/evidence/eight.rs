@@ -9,7 +9,7 @@ use super::measure::{ByUsed, FAILED, Measuring, Predictions, Trace, error};
 use crate::lanes::{LANES, Lanes, Mask, both};
 use crate::trajectory::lattice::MARGIN;
 use crate::trajectory::rung::Rung;
-use crate::trajectory::surface::is_same_surface;
+use crate::trajectory::surface::was_same_surface;
 
 /// What was found of eight samples.
 struct Eight {
@@ -112,7 +112,7 @@ impl Measuring<'_> {
         let straight = [moved[0] * phase, moved[1] * phase];
         let mut errors = [Lanes::default(); 2];
         for i in 0..LANES {
-            is_found[i] &= is_same_surface(run.depth[i], depth[i]);
+            is_found[i] &= was_same_surface(run.depth[i], depth[i]);
             let d = [run.d[0].0[i], run.d[1].0[i]];
             errors[0].0[i] = error([0.0; 2], d);
             errors[1].0[i] = error([straight[0].0[i], straight[1].0[i]], d);

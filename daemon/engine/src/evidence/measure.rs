@@ -18,7 +18,7 @@ use crate::trajectory::lattice::Lattice;
 use crate::trajectory::models::Models;
 use crate::trajectory::quadratic::Quadratic;
 use crate::trajectory::rung::Rung;
-use crate::trajectory::surface::{is_same_surface, nearest_cell};
+use crate::trajectory::surface::{nearest_cell, was_same_surface};
 
 /// c of (2), pixels at the next key: an in-between frame in the middle has half of the error or
 /// less, and a picture loses most of its contrast where it is a pixel off.
@@ -278,7 +278,7 @@ impl Measuring<'_> {
             return None;
         }
         let history = &self.before.row(row)[column as usize];
-        (history.keys > 0 && is_same_surface(history.depth, depth)).then_some(history)
+        (history.keys > 0 && was_same_surface(history.depth, depth)).then_some(history)
     }
 
     /// (3).
@@ -329,6 +329,10 @@ fn share(d: [f32; 2], foreseen: [f32; 2], off: &OffPerRung) -> [u8; 2] {
         let part = if all { NEWS } else { NEWS_ALONE };
         if !is_news(along[axis], part, d[axis] * d[axis]) {
             return Lead::WHOLE;
+        }
+        // What has stopped goes no further, from whichever side it came.
+        if d[axis].abs() <= NEWS_PX {
+            return 0;
         }
         ((foreseen[axis] / d[axis]).clamp(0.0, 1.0) * f32::from(Lead::WHOLE) + 0.5) as u8
     })
@@ -419,4 +423,32 @@ pub(super) fn error(predicted: [f32; 2], d: [f32; 2]) -> f32 {
 fn contrast([dx, dy]: [f32; 2]) -> f32 {
     let square = dx * dx + dy * dy;
     if square.is_finite() { square / (square + CONTRAST_PX * CONTRAST_PX) } else { 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_foreseen_is_the_same_in_a_mirror() {
+        let straight = |d: [f32; 2], foreseen: [f32; 2]| {
+            let hold = [-d[0], -d[1]];
+            let rest = both(|axis| foreseen[axis] - d[axis]);
+            std::array::from_fn(|rung| if rung == HOLD { hold } else { rest })
+        };
+        for d in [[12.0, 0.0], [12.0, 0.5], [12.0, 3.0], [0.0, 0.0], [1.0, -4.0]] {
+            for foreseen in [[12.0, 5.0], [12.0, -5.0], [3.0, 5.0], [0.0, 9.0]] {
+                let once = share(d, foreseen, &straight(d, foreseen));
+                for mirror in [[-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]] {
+                    // Zero is zero in a mirror, too, and has no sign.
+                    let mirrored = |v: [f32; 2]| both(|axis| v[axis] * mirror[axis] + 0.0);
+                    let [d, foreseen] = [d, foreseen].map(mirrored);
+                    let again = share(d, foreseen, &straight(d, foreseen));
+                    assert_eq!(again, once, "{d:?} foreseen {foreseen:?}");
+                }
+            }
+        }
+        let stopped = [[12.0, 0.0], [12.0, -5.0]];
+        assert_eq!(share(stopped[0], stopped[1], &straight(stopped[0], stopped[1])), [16, 0]);
+    }
 }

@@ -81,6 +81,24 @@ fn a_wheel_is_found_to_turn_and_the_wall_behind_it_to_stand() {
 }
 
 #[test]
+fn what_turns_close_before_a_wall_does_not_take_the_wall_along() {
+    const WALL: u32 = NEAR - NEAR / 11;
+    let keys = (0..4).map(|index| {
+        let was = |x, y| if is_disc(x, y) { turned(x, y, -0.35) } else { [x as f32, y as f32] };
+        key(index, |x, y| if is_disc(x, y) { NEAR } else { WALL }, was)
+    });
+    let (ladder, last) = climbed(Method::Auto, keys);
+    for (x, y) in [(60, 18), (80, 44), (60, 44)] {
+        assert_eq!(rung(&ladder, x, y), Rung::Affine, "{x}, {y}");
+    }
+    // Samples of the wall that see the disc, within two samples of them.
+    for (x, y) in [(102, 44), (102, 30), (18, 50), (26, 18)] {
+        assert!(!is_disc(x, y) && last.depth.at(x, y) == WALL);
+        assert_eq!(rung(&ladder, x, y), Rung::Hold, "{x}, {y}");
+    }
+}
+
+#[test]
 fn what_falls_is_found_to_accelerate() {
     // Fallen for 9 keys already: 4.5, 5.5, 6.5, .. pixels per key.
     let keys = (0..4).map(|index| {

@@ -11,7 +11,7 @@ use crate::color::{ColorFormat, ColorPlane, Texel};
 use crate::field::FieldMap;
 use crate::key::{KeyFrame, Velocity};
 use crate::plane::Plane;
-use crate::trajectory::surface::is_same_surface;
+use crate::trajectory::surface::was_same_surface;
 use crate::warp::sample::sample;
 
 /// Pixels from one sample to the next, per axis.
@@ -192,7 +192,7 @@ impl Comparison<'_> {
         let (from_x, from_y) = (from(x, v.x, valid.width)?, from(y, v.y, valid.height)?);
         let depth = key.depth.at(map.x.cell_of(x), map.y.cell_of(y));
         let was = older.depth.at(map.x.cell_of(from_x), map.y.cell_of(from_y));
-        if !is_same_surface(depth, was) {
+        if !was_same_surface(depth, was) {
             return None;
         }
         let (x, y) = (valid.x + x, valid.y + y);

@@ -3,15 +3,26 @@
 use super::grid::Grid;
 use crate::key::KeyFrame;
 
-/// Depth keys of one surface may differ by this fraction (a shift of 3: one eighth) from one key to
-/// the next and from a cell to its neighbour: ground seen at a low angle differs by as much.
-const DEPTH_TOLERANCE_SHIFT: u32 = 3;
+/// Depth keys of one surface may differ by this fraction (a shift of 4: one sixteenth) a few cells
+/// apart: ground seen at a low angle differs by as much, and what turns before a wall by little
+/// more.
+const DEPTH_SHIFT_BESIDE: u32 = 4;
+/// The same (one eighth) from one key to the next: what comes near does so by as much.
+const DEPTH_SHIFT_BEFORE: u32 = 3;
 
-/// Whether two depth keys may be of one surface.
+/// Whether two depth keys of one picture, of places beside each other, may be of one surface.
 #[must_use]
 #[inline(always)]
 pub fn is_same_surface(a: u32, b: u32) -> bool {
-    a.abs_diff(b) <= (a.max(b) >> DEPTH_TOLERANCE_SHIFT) + 1
+    a.abs_diff(b) <= (a.max(b) >> DEPTH_SHIFT_BESIDE) + 1
+}
+
+/// Whether the depth keys of a place in one key and of where it was in the key before may be of one
+/// surface.
+#[must_use]
+#[inline(always)]
+pub fn was_same_surface(now: u32, then: u32) -> bool {
+    now.abs_diff(then) <= (now.max(then) >> DEPTH_SHIFT_BEFORE) + 1
 }
 
 /// [`Around::nearest`] of the cells around `position` (pixels): most often it is the nearest of all,
@@ -83,7 +94,7 @@ impl Around {
 #[inline(always)]
 fn is_on(key: &KeyFrame, x: u32, y: u32, depth: Option<u32>) -> bool {
     match depth {
-        Some(depth) if !key.depth.data().is_empty() => is_same_surface(depth, key.depth.at(x, y)),
+        Some(depth) if !key.depth.data().is_empty() => was_same_surface(depth, key.depth.at(x, y)),
         _ => true,
     }
 }

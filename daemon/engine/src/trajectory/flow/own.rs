@@ -5,7 +5,7 @@ use super::luma::Level;
 use crate::key::KeyFrame;
 use crate::plane::{Plane, Rect};
 use crate::trajectory::grid::Grid;
-use crate::trajectory::surface::is_same_surface;
+use crate::trajectory::surface::was_same_surface;
 
 /// Pixels of a block per axis, and blocks that are looked at together.
 pub(super) const SIDE: usize = BLOCK as usize;
@@ -130,7 +130,7 @@ impl<'a> Own<'a> {
             (now[i], then[i]) = (depth[columns[i] as usize], older.at(xs[i], ys[i]));
         }
         for i in 0..SIDE {
-            were_seen[i] = is_same_surface(now[i], then[i]);
+            were_seen[i] = was_same_surface(now[i], then[i]);
         }
         were_seen
     }
