@@ -165,12 +165,15 @@ impl Comparison<'_> {
     }
 
     /// Whether what is at a cell, which `came` so far, is not shown to go on so, or did not come so:
-    /// it is held as nothing explains its motion, or damped as no eye can follow it.
+    /// it is held, along one axis or both, as nothing explains its motion, or damped as no eye can
+    /// follow it.
     #[inline(always)]
     fn goes_otherwise(&self, [x, y]: [u32; 2], came: Velocity) -> bool {
         let came_px = [came.x, came.y].map(|v| f32::from(v) / Velocity::PER_PX as f32);
         let is_far = |[dx, dy]: [f32; 2]| dx.abs().max(dy.abs()) > OTHERWISE_PX;
-        let is_held = self.key.velocity.at(x, y) == Velocity::default() && is_far(came_px);
+        let goes = self.key.velocity.at(x, y);
+        let is_held_along = |goes: i16, came_px: f32| goes == 0 && came_px.abs() > OTHERWISE_PX;
+        let is_held = is_held_along(goes.x, came_px[0]) || is_held_along(goes.y, came_px[1]);
         let displacement = &self.key.displacement;
         let is_damped = !displacement.data().is_empty() && {
             let [dx, dy] = displacement.at(x, y);

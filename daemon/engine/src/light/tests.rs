@@ -127,6 +127,11 @@ fn what_is_not_shown_to_go_as_it_came_has_no_light_of_its_own() {
         key.velocity = plane(SIZE[0], SIZE[1], |_, _| Velocity::default());
     }
     assert!(after(&held).gains(&pool(2), Phase::ONE).is_none());
+    // Held across alone.
+    for key in &mut held {
+        key.velocity = plane(SIZE[0], SIZE[1], |_, _| Velocity { x: 0, y: 16 });
+    }
+    assert!(after(&held).gains(&pool(2), Phase::ONE).is_none());
     let mut damped = keys(grows);
     for key in &mut damped {
         key.displacement = plane(SIZE[0], SIZE[1], |_, _| [PAN as f32 + 1.5, 0.0]);
