@@ -5,7 +5,9 @@ use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::Path;
 
 use foreframe_protocol::memory::create_memfd;
-use foreframe_protocol::socket::{Channel, Listener, Received, Sent, socket_path_in};
+use foreframe_protocol::socket::{
+    Channel, Listener, Received, Sent, check_socket_path, socket_path_in,
+};
 use foreframe_protocol::{DestroyStream, Error, Packet, RegisterPool};
 use rustix::io::{FdFlags, fcntl_getfd};
 
@@ -205,4 +207,24 @@ fn the_usual_place_needs_an_absolute_runtime_folder() {
         let error = socket_path_in(folder).unwrap_err().to_string();
         assert!(error.contains("--socket"), "{error}");
     }
+}
+
+#[test]
+fn what_a_daemon_would_be_refused_is_known_without_making_anything() {
+    let folder = tempfile::tempdir().unwrap();
+    mode(folder.path(), 0o700);
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("file"), "kept").unwrap();
+    std::fs::create_dir(at("open")).unwrap();
+    mode(&at("open"), 0o755);
+    let long = "x".repeat(120);
+    for name in ["new/s", "s", "none/below/s", "file", "file/s", "open/s", &long] {
+        let before = std::fs::read_dir(&folder).unwrap().count();
+        let told = check_socket_path(&at(name)).map_err(|error| error.to_string());
+        assert_eq!(std::fs::read_dir(&folder).unwrap().count(), before, "{name}");
+        let bound = Listener::bind(&at(name)).map(drop).map_err(|error| error.to_string());
+        assert_eq!(told, bound, "{name}");
+    }
+    drop(Listener::bind(&at("s")).unwrap());
+    check_socket_path(&at("s")).unwrap();
 }

@@ -59,6 +59,12 @@ fn the_doctor_finds_the_daemon_that_runs_and_says_where_none_does() {
     assert_eq!(found, Ok(Some(expected)));
     let elsewhere = daemon.socket.with_file_name("elsewhere.sock");
     assert_eq!(Facts::gather(Some(&elsewhere)).daemon, Ok(None));
+    let nowhere = daemon.socket.join("below-a-socket/daemon.sock");
+    let found = Facts::gather(Some(&nowhere));
+    assert!(
+        found.socket.as_ref().is_err_and(|said| said.contains("below-a-socket: expected a folder")),
+        "{found:?}"
+    );
 }
 
 #[test]

@@ -9,8 +9,9 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 use foreframe_protocol::{Body as _, CreateStream, PlaneKind, StreamFormat, Submit};
+use xxhash_rust::xxh3::Xxh3;
 
-use super::codec;
+use super::codec::{self, Coding};
 use super::error::CaptureError;
 use super::index::{CapturedPose, FrameEntry, Index, Span};
 use super::info::CaptureInfo;
@@ -223,6 +224,40 @@ impl<S: ReadAt> Capture<S> {
         let (entry, record) = self.record(number)?;
         let submit = self.parse_submit(entry, &record)?;
         Ok((submit, record.planes.iter().map(|plane| plane.info).collect()))
+    }
+
+    /// A hash of all that one of [`Capture::streams`] shows: its format, and of each frame its
+    /// times, cameras and pixels. How the pixels are stored and when they arrived takes no part.
+    /// Pixels are not read: their hashes are in the records.
+    ///
+    /// # Errors
+    /// If a frame's record cannot be read.
+    pub fn content_hash(&self, stream: usize) -> Result<u128, CaptureError> {
+        let mut hash = Xxh3::new();
+        hash.update(&self.index.streams[stream].create);
+        let mut bytes = Vec::new();
+        for number in 0..self.frame_count() {
+            let (entry, record) = self.record(number)?;
+            if entry.stream != stream {
+                continue;
+            }
+            let submit = self.parse_submit(entry, &record)?;
+            bytes.clear();
+            bytes.extend(submit.content_time_ns.to_le_bytes());
+            bytes.extend(submit.motion_from_ns.unwrap_or(u64::MAX).to_le_bytes());
+            bytes.push(u8::from(submit.is_cut));
+            for camera in [submit.camera, submit.motion_from_camera] {
+                bytes.push(u8::from(camera.is_some()));
+                for matrix in camera.iter().flat_map(|camera| [camera.view, camera.projection]) {
+                    bytes.extend(matrix.iter().flat_map(|element| element.to_le_bytes()));
+                }
+            }
+            for plane in record.planes {
+                PlaneEntry { coding: Coding::RAW, stored_len: 0, ..plane }.write(&mut bytes);
+            }
+            hash.update(&bytes);
+        }
+        Ok(hash.digest128())
     }
 
     /// A frame with all its planes.

@@ -141,7 +141,7 @@ impl<'a> Fields<'a> {
 }
 
 impl PlaneEntry {
-    fn write(&self, out: &mut Vec<u8>) {
+    pub(super) fn write(&self, out: &mut Vec<u8>) {
         let info = &self.info;
         let [codec, filter] = self.coding.to_wire();
         let PixelLayout { element_bytes, channels } = info.layout;

@@ -165,6 +165,32 @@ fn what_was_written_comes_back_with_every_coding() {
 }
 
 #[test]
+fn the_content_hash_is_of_what_is_shown_and_not_of_how_it_is_stored() {
+    let hash = |samples: &[Sample], coding| {
+        open(&written(samples, coding)).unwrap().content_hash(0).unwrap()
+    };
+    let first = hash(&samples(5), Coding::RAW);
+    for coding in Coding::ALL {
+        let mut late = samples(5);
+        late.iter_mut().for_each(|sample| sample.arrived_at_ns += 12_345);
+        assert_eq!(hash(&late, coding), first);
+    }
+    let changes: [fn(&mut Sample); 5] = [
+        |sample| sample.planes[0].bytes[7] ^= 1,
+        |sample| sample.planes[1].bytes[0] ^= 1,
+        |sample| sample.planes[1].info.jitter[0] += 0.25,
+        |sample| sample.submit.is_cut = true,
+        |sample| sample.submit.camera = Some(camera(0.5)),
+    ];
+    for (number, change) in changes.iter().enumerate() {
+        let mut changed = samples(5);
+        change(&mut changed[2]);
+        assert_ne!(hash(&changed, Coding::RAW), first, "change {number}");
+    }
+    assert_ne!(hash(&samples(4), Coding::RAW), first);
+}
+
+#[test]
 fn frames_are_found_in_any_order_and_by_the_planes_that_are_wanted() {
     let samples = samples(5);
     let bytes = written(&samples, Coding::FAST);

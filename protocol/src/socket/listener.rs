@@ -2,15 +2,14 @@
 //! what a killed one left behind is replaced.
 
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
-use std::os::unix::fs::FileTypeExt;
 use std::path::{Path, PathBuf};
 
 use rustix::fs::{FlockOperation, Mode, OFlags, flock};
 use rustix::io::Errno;
-use rustix::net::{AddressFamily, SocketAddrUnix, SocketFlags, SocketType};
+use rustix::net::{AddressFamily, SocketFlags, SocketType};
 
 use super::channel::Channel;
-use super::path::{path_error, prepare_folder};
+use super::path::{address_of, check_place, path_error, prepare_folder};
 use crate::error::{Error, Result};
 
 /// Connections that may wait to be accepted.
@@ -37,13 +36,7 @@ impl Listener {
         let lock = lock(path)?;
         remove_stale_socket(path)?;
 
-        let address = SocketAddrUnix::new(path).map_err(|_| {
-            path_error(
-                path,
-                "a path of at most 107 bytes",
-                format!("{} bytes", path.as_os_str().len()),
-            )
-        })?;
+        let address = address_of(path)?;
         let socket = new_socket()?;
         rustix::net::bind(&socket, &address)
             .map_err(|errno| path_error(path, "a place for a socket", errno))?;
@@ -109,13 +102,8 @@ fn lock(socket: &Path) -> Result<OwnedFd> {
 
 /// Removes the socket of a daemon that did not get round to it. The lock says that none runs.
 fn remove_stale_socket(path: &Path) -> Result<()> {
-    let found = match std::fs::symlink_metadata(path) {
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(()),
-        Err(error) => return Err(path_error(path, "a place for a socket", error)),
-        Ok(found) => found,
-    };
-    if !found.file_type().is_socket() {
-        return Err(path_error(path, "a socket or nothing: remove it", "another file"));
+    if !check_place(path)? {
+        return Ok(());
     }
     std::fs::remove_file(path)
         .map_err(|error| path_error(path, "a socket that can be replaced", error))

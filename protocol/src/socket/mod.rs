@@ -11,4 +11,4 @@ mod path;
 
 pub use channel::{Channel, Incoming, PeerCredentials, Received, Sent};
 pub use listener::Listener;
-pub use path::{SOCKET_NAME, default_socket_path, socket_path_in};
+pub use path::{SOCKET_NAME, check_socket_path, default_socket_path, socket_path_in};

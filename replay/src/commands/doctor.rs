@@ -5,7 +5,6 @@ use std::path::PathBuf;
 
 use foreframed::config::read_profile;
 
-use super::ctl::SocketArgs;
 use crate::doctor::machine::{Facts, examine_machine};
 use crate::doctor::{Examination, Report, examine_file};
 use crate::options::{number, parse_count};
@@ -29,9 +28,10 @@ pub struct Args {
     /// Capture to look into [default: this machine]
     #[arg(value_name = "FILE.mcap")]
     pub file: Option<PathBuf>,
-    /// Which daemon to look for, without a capture.
-    #[command(flatten)]
-    pub socket: SocketArgs,
+    /// Socket of the daemon to look for, without a capture [default: foreframe/daemon.sock in
+    /// XDG_RUNTIME_DIR]
+    #[arg(long, value_name = "PATH", conflicts_with = "file")]
+    pub socket: Option<PathBuf>,
     /// Keys to look at, the first that move
     #[arg(long, value_name = "N", default_value = "8", requires = "file")]
     #[arg(value_parser = parse_count, allow_negative_numbers = true)]
@@ -52,7 +52,7 @@ pub struct Args {
 /// daemon cannot run here.
 pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
     let Some(file) = &args.file else {
-        let report = examine_machine(&Facts::gather(args.socket.socket.as_deref()));
+        let report = examine_machine(&Facts::gather(args.socket.as_deref()));
         output.result(&report, &report.to_text())?;
         return match report.wrong() {
             0 => Ok(()),

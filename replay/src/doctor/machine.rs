@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 use std::thread::available_parallelism;
 
 use foreframe_engine::Simd;
-use foreframe_engine::backend::choice::BackendChoice;
+use foreframe_engine::backend::choice::{BackendChoice, Chosen};
 use foreframe_protocol::memory::{WritablePool, verify};
-use foreframe_protocol::socket::default_socket_path;
+use foreframe_protocol::socket::{check_socket_path, default_socket_path};
 use foreframed::control::{ControlError, Controller, Request, Response};
 use foreframed::gpu::Gpus;
 use foreframed::stream::real_time;
@@ -61,9 +61,9 @@ pub struct Facts {
     pub processors: usize,
     /// The widest registers of kernels.
     pub registers: &'static str,
-    /// Where a daemon would listen.
+    /// Where a daemon would listen, if it can.
     pub socket: Result<PathBuf, String>,
-    /// What one that runs there says of itself; None where none runs.
+    /// What one that runs there says of itself; None where none runs, or could.
     pub daemon: Result<Option<String>, String>,
     /// Whether a pool could be made and sealed.
     pub shared_memory: Result<(), String>,
@@ -73,8 +73,8 @@ pub struct Facts {
     pub huge_pages: Option<String>,
     /// WAYLAND_DISPLAY and DISPLAY, where they say something.
     pub displays: [Option<String>; 2],
-    /// The GPU adapters, and what would be chosen among them for an application that does not say
-    /// what it renders on.
+    /// How many GPU adapters there are, and why one of them is chosen for an application that does
+    /// not say what it renders on; or why none is.
     pub gpus: Result<(usize, String), String>,
 }
 
@@ -85,6 +85,7 @@ impl Facts {
     pub fn gather(socket: Option<&Path>) -> Self {
         let said = |name: &str| std::env::var(name).ok().filter(|text| !text.is_empty());
         let socket = socket.map_or_else(default_socket_path, |path| Ok(path.to_owned()));
+        let socket = socket.and_then(|path| check_socket_path(&path).map(|()| path));
         let socket = socket.map_err(|error| error.to_string());
         Self {
             processors: available_parallelism().map_or(1, usize::from),
@@ -95,10 +96,18 @@ impl Facts {
             real_time: real_time::probe().map_err(|error| error.to_string()),
             huge_pages: fs::read_to_string(HUGE_PAGES).ok(),
             displays: ["WAYLAND_DISPLAY", "DISPLAY"].map(said),
-            gpus: Gpus::find(BackendChoice::Auto)
-                .map(|gpus| (gpus.facts().len(), gpus.choose_for(None).why))
-                .map_err(|error| error.to_string()),
+            gpus: choose_gpu(),
         }
+    }
+}
+
+/// As [`Facts::gpus`].
+fn choose_gpu() -> Result<(usize, String), String> {
+    let gpus = Gpus::find(BackendChoice::Auto).map_err(|error| error.to_string())?;
+    let Chosen { adapter, why } = gpus.choose_for(None);
+    match adapter {
+        Some(_) => Ok((gpus.facts().len(), why)),
+        None => Err(why),
     }
 }
 
@@ -144,7 +153,8 @@ pub fn examine_machine(facts: &Facts) -> MachineReport {
             "socket",
             State::Wrong,
             error.clone(),
-            "a login sets it: export XDG_RUNTIME_DIR=/run/user/$(id -u)",
+            "no daemon can listen there; a login sets a place: export \
+             XDG_RUNTIME_DIR=/run/user/$(id -u)",
         ),
     };
     let daemon = match &facts.daemon {
@@ -156,7 +166,7 @@ pub fn examine_machine(facts: &Facts) -> MachineReport {
             "daemon",
             State::Wrong,
             error.clone(),
-            "it is stuck or of another version: end it, and start this one",
+            "it is another user's, stuck or of another version: end it, and start this one",
         ),
     };
     let shared_memory = match &facts.shared_memory {
@@ -205,18 +215,10 @@ pub fn examine_machine(facts: &Facts) -> MachineReport {
         Ok((count, why)) => ok("GPU adapters", format!("{count}; chosen: {why}")),
         Err(error) => other("GPU adapters", State::Hint, error.clone(), "the CPU makes the frames"),
     };
-    MachineReport {
-        machine: vec![
-            processors,
-            socket,
-            daemon,
-            shared_memory,
-            real_time,
-            huge_pages,
-            display,
-            gpus,
-        ],
-    }
+    // Nobody can be asked where nobody can listen.
+    let daemon = facts.socket.is_ok().then_some(daemon);
+    let rest = [shared_memory, real_time, huge_pages, display, gpus];
+    MachineReport { machine: [processors, socket].into_iter().chain(daemon).chain(rest).collect() }
 }
 
 impl MachineReport {
@@ -259,7 +261,7 @@ mod tests {
             real_time: Ok(()),
             huge_pages: Some("always [madvise] never\n".to_owned()),
             displays: [Some("wayland-0".to_owned()), None],
-            gpus: Ok((0, "no GPU adapter".to_owned())),
+            gpus: Ok((1, "the only one".to_owned())),
         }
     }
 
@@ -306,6 +308,6 @@ mod tests {
 
     #[test]
     fn sealed_memory_can_be_had_wherever_these_tests_run() {
-        assert_eq!(Facts::gather(None).shared_memory, Ok(()));
+        try_pool().unwrap();
     }
 }
