@@ -20,5 +20,6 @@ pub mod score;
 pub mod stability;
 pub mod top;
 pub mod virtual_time;
+pub mod whole_file;
 
 pub use foreframed::draw;

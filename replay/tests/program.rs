@@ -79,11 +79,46 @@ fn a_check_passes_on_what_was_written_and_exits_with_1_when_something_regressed(
     assert_eq!(found["methods"][1]["digest"]["passed"], true);
     let junit = fs::read_to_string(folder.path().join("pan.xml")).unwrap();
     assert!(junit.contains("failures=\"1\""), "{junit}");
-    let other = in_folder("scenes atrium --size 64x36 --seconds 0.1 -o pan.mcap");
+    // A capture whose colours are the same, and its fields not.
+    let other = in_folder("scenes pan --size 64x36 --seconds 0.1 --field-ratio 2 -o pan.mcap");
     assert!(other.status.success());
-    let said = in_folder("check pan.mcap --baseline pan.json").stderr;
+    let said = in_folder("check pan.mcap --baseline pan.json --junit pan.xml").stderr;
     let said = String::from_utf8(said).unwrap();
-    assert!(said.contains("expected the capture that the baseline is of, `pan`"), "{said}");
+    assert!(said.contains("expected the capture that the baseline is of, \"pan\""), "{said}");
+    assert_eq!(fs::read_to_string(folder.path().join("pan.xml")).unwrap(), "", "no older result");
+}
+
+#[test]
+fn a_check_writes_over_nothing_but_baselines_and_takes_no_ratio_that_leaves_one_key() {
+    let folder = tempfile::tempdir().unwrap();
+    let fails = |arguments: &str, expected: &str| {
+        let mut command = foreframe();
+        let output = command.current_dir(&folder).args(arguments.split(' ')).output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{arguments}: {said}");
+        assert!(said.contains(expected), "{arguments}: expected `{expected}` in: {said}");
+    };
+    let made = foreframe()
+        .current_dir(&folder)
+        .args("scenes pan --size 32x18 --seconds 0.05 -o pan.mcap".split(' '))
+        .status()
+        .unwrap();
+    assert!(made.success());
+    let capture = fs::read(folder.path().join("pan.mcap")).unwrap();
+    fs::copy(folder.path().join("pan.mcap"), folder.path().join("other.mcap")).unwrap();
+    fails("check pan.mcap --baseline ./pan.mcap --write", "expected another file than that of");
+    fails("check pan.mcap --baseline other.mcap --write", "expected a baseline or no file");
+    fails("check pan.mcap --baseline no-such-folder/x.json --write", "making a file beside");
+    fails("check pan.mcap --baseline x.json --junit pan.mcap", "--junit: expected another file");
+    for ratio in ["1000", "18446744073709551615"] {
+        let line = format!("check pan.mcap --baseline x.json --write --ratio {ratio}");
+        fails(&line, "expected frames between two keys, found none");
+    }
+    for name in ["pan.mcap", "other.mcap"] {
+        assert_eq!(fs::read(folder.path().join(name)).unwrap(), capture, "{name} is whole");
+    }
+    let left = fs::read_dir(&folder).unwrap().count();
+    assert_eq!(left, 2, "nothing is left behind");
 }
 
 #[test]

@@ -29,21 +29,22 @@ pub struct Baseline {
     pub ratio: usize,
     /// Predicted frames.
     pub frames: u64,
-    /// The digest of the true frames, 32 hexadecimal digits: what tells one capture from another.
-    pub truth: String,
+    /// [`foreframed::capture::Capture::content_hash`], 32 hexadecimal digits: what tells one
+    /// capture from another.
+    pub content: String,
     /// One entry per method.
     pub methods: Vec<MethodBaseline>,
 }
 
 /// What one method made of it.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct MethodBaseline {
     /// Name of the method.
     pub name: String,
     /// The digest of all frames that it predicted, 32 hexadecimal digits.
     pub digest: String,
     /// How good they are.
-    #[serde(flatten)]
     pub quality: Quality,
 }
 
@@ -54,23 +55,25 @@ struct Head {
 }
 
 impl Baseline {
-    /// What `score` found.
+    /// What `score` found in the capture of this content; None where no frame was predicted.
     #[must_use]
-    pub fn new(score: &CaptureScore) -> Self {
-        let methods = score.methods.iter().map(|method| MethodBaseline {
-            name: method.name.to_owned(),
-            digest: method.digest.clone(),
-            quality: Quality::new(method),
+    pub fn new(score: &CaptureScore, content: String) -> Option<Self> {
+        let methods = score.methods.iter().map(|method| {
+            Some(MethodBaseline {
+                name: method.name.to_owned(),
+                digest: method.digest.clone(),
+                quality: Quality::new(method)?,
+            })
         });
-        Self {
+        Some(Self {
             foreframe_baseline: FORMAT,
             version: env!("CARGO_PKG_VERSION").to_owned(),
             capture: score.name.clone(),
             ratio: score.ratio,
-            frames: score.methods.first().map_or(0, |method| method.frames),
-            truth: score.truth_digest.clone(),
-            methods: methods.collect(),
-        }
+            frames: score.methods.first()?.frames,
+            content,
+            methods: methods.collect::<Option<_>>()?,
+        })
     }
 
     /// Reads the file at `path`.
@@ -94,16 +97,33 @@ impl Baseline {
         ensure!(found == FORMAT, "expected format {FORMAT}, found {found}: --write makes it anew");
         let baseline: Self = serde_json::from_str(text)?;
         ensure!(!baseline.methods.is_empty(), "expected a method or more, found none");
+        for (i, MethodBaseline { name, .. }) in baseline.methods.iter().enumerate() {
+            let is_new = baseline.methods[..i].iter().all(|other| other.name != *name);
+            ensure!(is_new, "expected each method once, found `{name}` twice");
+        }
         Ok(baseline)
     }
 
-    /// Writes the file at `path`, in place of what was there.
+    /// That nothing at `path` would be lost but a baseline.
     ///
     /// # Errors
-    /// If it cannot be written.
-    pub fn write(&self, path: &Path) -> anyhow::Result<()> {
-        let text = serde_json::to_string_pretty(self)? + "\n";
-        fs::write(path, text).with_context(|| format!("writing {}", path.display()))
+    /// If something else is there.
+    pub fn ensure_replaceable(path: &Path) -> anyhow::Result<()> {
+        let is_baseline = match fs::read(path) {
+            Err(error) if error.kind() == ErrorKind::NotFound => true,
+            Err(_) => false,
+            Ok(bytes) => serde_json::from_slice::<Head>(&bytes).is_ok(),
+        };
+        ensure!(is_baseline, "{}: expected a baseline or no file: it stays", path.display());
+        Ok(())
+    }
+
+    /// The file, as it is written.
+    ///
+    /// # Errors
+    /// Never: numbers and texts become JSON.
+    pub fn to_text(&self) -> anyhow::Result<String> {
+        Ok(serde_json::to_string_pretty(self)? + "\n")
     }
 
     /// Frames from key to key and methods, as `score` takes them.
@@ -124,15 +144,15 @@ impl Baseline {
     /// What was expected and what was found.
     pub fn ensure_same_capture(&self, found: &Self) -> anyhow::Result<()> {
         ensure!(
-            (self.frames, &self.truth) == (found.frames, &found.truth),
-            "expected the capture that the baseline is of, `{}` with {} frames to predict of digest \
-             {}, found `{}` with {} of digest {}: --write makes a baseline of this one",
+            (self.frames, &self.content) == (found.frames, &found.content),
+            "expected the capture that the baseline is of, {:?} with {} frames to predict and content \
+             {}, found {:?} with {} and {}: --write makes a baseline of this one",
             self.capture,
             self.frames,
-            self.truth,
+            self.content,
             found.capture,
             found.frames,
-            found.truth
+            found.content
         );
         Ok(())
     }
@@ -143,7 +163,14 @@ mod tests {
     use super::*;
 
     fn baseline() -> Baseline {
-        let quality = Quality { psnr_rgb_db: Some(31.25), ssim: Some(0.1), ..Quality::default() };
+        let quality = Quality {
+            psnr_rgb_db: 31.25,
+            psnr_y_db: 31.5,
+            ssim: 0.1,
+            flip: 0.25,
+            worst_tile_psnr_db: 9.0,
+            error_flicker: 1.0,
+        };
         let method = MethodBaseline { name: "auto".into(), digest: "0f".repeat(16), quality };
         Baseline {
             foreframe_baseline: FORMAT,
@@ -151,7 +178,7 @@ mod tests {
             capture: "cart".into(),
             ratio: 4,
             frames: 36,
-            truth: "ab".repeat(16),
+            content: "ab".repeat(16),
             methods: vec![method],
         }
     }
@@ -160,7 +187,7 @@ mod tests {
     fn what_was_written_is_read() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("cart.json");
-        baseline().write(&path).unwrap();
+        fs::write(&path, baseline().to_text().unwrap()).unwrap();
         assert_eq!(Baseline::read(&path).unwrap(), baseline());
     }
 
@@ -178,16 +205,38 @@ mod tests {
         let written = serde_json::to_string(&baseline()).unwrap();
         let newer = written.replace("\"foreframe_baseline\":1", "\"foreframe_baseline\":2");
         let none = Baseline { methods: Vec::new(), ..baseline() };
+        let twice =
+            Baseline { methods: [baseline().methods, baseline().methods].concat(), ..baseline() };
+        let misspelt = written.replace("psnr_rgb_db", "psnr_rgb");
+        let absent = written.replace("\"ssim\":0.1,", "");
         for (text, expected) in [
             (None, "found no such file: --write makes one"),
             (Some("no JSON"), "expected a baseline: expected ident"),
             (Some("{}"), "missing field `foreframe_baseline`"),
             (Some(&newer), "expected format 1, found 2: --write makes it anew"),
             (Some(&serde_json::to_string(&none).unwrap()), "expected a method or more"),
+            (Some(&serde_json::to_string(&twice).unwrap()), "found `auto` twice"),
+            (Some(&misspelt), "unknown field `psnr_rgb`"),
+            (Some(&absent), "missing field `ssim`"),
         ] {
             let said = said(text);
             assert!(said.contains(expected) && said.contains("x.json"), "{said}");
         }
+    }
+
+    #[test]
+    fn nothing_but_a_baseline_is_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("cart.mcap");
+        Baseline::ensure_replaceable(&path).unwrap();
+        fs::write(&path, baseline().to_text().unwrap()).unwrap();
+        Baseline::ensure_replaceable(&path).unwrap();
+        for other in ["", "{}", "\u{89}MCAP0"] {
+            fs::write(&path, other).unwrap();
+            let said = Baseline::ensure_replaceable(&path).unwrap_err().to_string();
+            assert!(said.contains("expected a baseline or no file"), "{said}");
+        }
+        assert!(Baseline::ensure_replaceable(folder.path()).is_err());
     }
 
     #[test]
@@ -205,7 +254,7 @@ mod tests {
     fn another_capture_is_told_apart_by_its_frames_and_not_by_its_name() {
         let renamed = Baseline { capture: "kart".into(), ..baseline() };
         baseline().ensure_same_capture(&renamed).unwrap();
-        let other = Baseline { truth: "cd".repeat(16), ..baseline() };
+        let other = Baseline { content: "cd".repeat(16), ..baseline() };
         let said = baseline().ensure_same_capture(&other).unwrap_err().to_string();
         assert!(said.contains(&"ab".repeat(16)) && said.contains(&"cd".repeat(16)), "{said}");
     }

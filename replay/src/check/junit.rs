@@ -13,19 +13,23 @@ use super::{Comparison, MethodComparison};
 /// Never: memory can be written.
 pub fn junit(comparison: &Comparison) -> anyhow::Result<String> {
     let (compared, failed) = comparison.counts();
-    let [compared, failed] = [compared, failed].map(|count| count.to_string());
+    let skipped = comparison.methods.iter().filter(|method| !method.digest.is_asked).count();
+    let [cases, failed, skipped] =
+        [compared + skipped, failed, skipped].map(|count| count.to_string());
+    let capture = printable(&comparison.capture);
     let mut xml = Writer::new_with_indent(Vec::new(), b' ', 2);
     xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
     let suite = xml.create_element("testsuite").with_attributes([
-        ("name", comparison.capture.as_str()),
-        ("tests", &compared),
+        ("name", capture.as_str()),
+        ("tests", &cases),
         ("failures", &failed),
+        ("skipped", &skipped),
     ]);
     suite.write_inner_content(|xml| {
         for method in &comparison.methods {
-            let class = format!("{}.{}", comparison.capture, method.name);
-            for (name, failure) in cases(method) {
-                write_case(xml, [&class, name], failure.as_deref())?;
+            let class = format!("{capture}.{}", method.name);
+            for (name, outcome) in outcomes(method) {
+                write_case(xml, [&class, name], &outcome)?;
             }
         }
         Ok(())
@@ -33,27 +37,49 @@ pub fn junit(comparison: &Comparison) -> anyhow::Result<String> {
     Ok(String::from_utf8(xml.into_inner())? + "\n")
 }
 
-/// What was compared, and what is said of it where it failed.
-fn cases(method: &MethodComparison) -> Vec<(&'static str, Option<String>)> {
-    let failure = |passed: bool, said: String| (!passed).then_some(said);
-    let digest = failure(method.digest.passed, method.digest.to_text());
+/// `text` without what XML 1.0 cannot hold.
+fn printable(text: &str) -> String {
+    text.chars().filter(|c| !c.is_control()).collect()
+}
+
+/// What became of a case.
+enum Outcome {
+    Passed,
+    Skipped,
+    /// With what is said of it.
+    Failed(String),
+}
+
+/// What was compared.
+fn outcomes(method: &MethodComparison) -> Vec<(&'static str, Outcome)> {
+    let outcome = |passed: bool, said: String| match passed {
+        true => Outcome::Passed,
+        false => Outcome::Failed(said),
+    };
+    let digest = match method.digest.is_asked {
+        true => outcome(method.digest.passed, method.digest.to_text()),
+        false => Outcome::Skipped,
+    };
     let metrics = method
         .quality
         .iter()
-        .map(|metric| (metric.metric.name(), failure(metric.passed, metric.to_text())));
+        .map(|metric| (metric.metric.name(), outcome(metric.passed, metric.to_text())));
     std::iter::once(("digest", digest)).chain(metrics).collect()
 }
 
 fn write_case(
     xml: &mut Writer<Vec<u8>>,
     [class, name]: [&str; 2],
-    failure: Option<&str>,
+    outcome: &Outcome,
 ) -> io::Result<()> {
     let case =
         xml.create_element("testcase").with_attributes([("classname", class), ("name", name)]);
-    match failure {
-        None => case.write_empty()?,
-        Some(said) => case.write_inner_content(|xml| {
+    match outcome {
+        Outcome::Passed => case.write_empty()?,
+        Outcome::Skipped => {
+            case.write_inner_content(|xml| xml.create_element("skipped").write_empty().map(|_| ()))?
+        }
+        Outcome::Failed(said) => case.write_inner_content(|xml| {
             xml.create_element("failure").write_text_content(BytesText::new(said)).map(|_| ())
         })?,
     };

@@ -4,6 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::score::report::MethodScore;
 
+/// PSNR from which on no difference is seen, dB: less than one level of 256 everywhere.
+const PERFECT_DB: f64 = 50.0;
+
 /// A metric of `score`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -58,47 +61,52 @@ impl Metric {
         }
     }
 
-    /// By how much `found` is worse than `baseline`; negative where it is better.
+    /// By how much `found` is worse than `baseline`; negative where it is better. Beyond
+    /// [`PERFECT_DB`] nothing is.
     #[must_use]
     pub fn loss(self, baseline: f64, found: f64) -> f64 {
         match self {
-            Self::PsnrRgbDb | Self::PsnrYDb | Self::Ssim | Self::WorstTilePsnrDb => {
-                baseline - found
+            Self::PsnrRgbDb | Self::PsnrYDb | Self::WorstTilePsnrDb => {
+                // Not `min`, which would take a number for NaN.
+                let found = if found > PERFECT_DB { PERFECT_DB } else { found };
+                baseline.min(PERFECT_DB) - found
             }
+            Self::Ssim => baseline - found,
             Self::Flip | Self::ErrorFlicker => found - baseline,
         }
     }
 }
 
-/// All of them, of one method on one capture. None where no frame was predicted.
-#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
+/// All of them, of one method on one capture.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 #[expect(missing_docs, reason = "each is the metric of its name")]
 pub struct Quality {
-    pub psnr_rgb_db: Option<f64>,
-    pub psnr_y_db: Option<f64>,
-    pub ssim: Option<f64>,
-    pub flip: Option<f64>,
-    pub worst_tile_psnr_db: Option<f64>,
-    pub error_flicker: Option<f64>,
+    pub psnr_rgb_db: f64,
+    pub psnr_y_db: f64,
+    pub ssim: f64,
+    pub flip: f64,
+    pub worst_tile_psnr_db: f64,
+    pub error_flicker: f64,
 }
 
 impl Quality {
-    /// What `score` found.
+    /// What `score` found; None where no frame was predicted.
     #[must_use]
-    pub fn new(score: &MethodScore) -> Self {
-        Self {
-            psnr_rgb_db: score.psnr_rgb_db,
-            psnr_y_db: score.psnr_y_db,
-            ssim: score.ssim,
-            flip: score.flip,
-            worst_tile_psnr_db: score.worst_tile_psnr_db,
-            error_flicker: score.error_flicker,
-        }
+    pub fn new(score: &MethodScore) -> Option<Self> {
+        Some(Self {
+            psnr_rgb_db: score.psnr_rgb_db?,
+            psnr_y_db: score.psnr_y_db?,
+            ssim: score.ssim?,
+            flip: score.flip?,
+            worst_tile_psnr_db: score.worst_tile_psnr_db?,
+            error_flicker: score.error_flicker?,
+        })
     }
 
     /// One of them.
     #[must_use]
-    pub const fn of(&self, metric: Metric) -> Option<f64> {
+    pub const fn of(&self, metric: Metric) -> f64 {
         match metric {
             Metric::PsnrRgbDb => self.psnr_rgb_db,
             Metric::PsnrYDb => self.psnr_y_db,

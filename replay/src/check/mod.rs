@@ -1,9 +1,9 @@
 //! Compares what the engine makes of a capture with what it made before.
 //!
 //! A [`Baseline`] is a small file that lies beside the source code of whoever depends on the
-//! pictures: digests and quality of a few methods on one capture. The same capture gives the same
-//! bytes on every machine, so another digest is a change of the engine, and [`Metric::loss`] says
-//! whether it is one for the worse.
+//! pictures: digests and quality of a few methods on one capture. The same capture, told by a hash
+//! of all that was recorded, gives the same bytes on every machine, so another digest is a change
+//! of the engine, and [`Metric::loss`] says whether it is one for the worse.
 
 mod baseline;
 mod junit;
@@ -46,19 +46,21 @@ pub struct MethodComparison {
     pub name: String,
     /// The digest of all its frames.
     pub digest: DigestComparison,
-    /// One entry per metric that the baseline has.
+    /// One entry per metric.
     pub quality: Vec<MetricComparison>,
 }
 
 /// Whether all frames have the bytes that they had.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct DigestComparison {
+    /// Whether they have to.
+    pub is_asked: bool,
     /// Whether they have, or need not.
     pub passed: bool,
     /// That of the baseline, 32 hexadecimal digits.
     pub baseline: String,
-    /// That of now.
-    pub found: String,
+    /// That of now; None where the method was not run.
+    pub found: Option<String>,
 }
 
 /// Whether one metric is as good as it was.
@@ -70,7 +72,7 @@ pub struct MetricComparison {
     pub metric: Metric,
     /// That of the baseline.
     pub baseline: f64,
-    /// That of now; None where it could not be measured.
+    /// That of now; None where the method was not run.
     pub found: Option<f64>,
     /// By how much it may be worse.
     pub tolerance: f64,
@@ -83,9 +85,9 @@ impl Comparison {
         let methods: Vec<_> = baseline
             .methods
             .iter()
-            .filter_map(|was| {
-                let is = found.methods.iter().find(|is| is.name == was.name)?;
-                Some(MethodComparison::new(was, is, demand))
+            .map(|was| {
+                let is = found.methods.iter().find(|is| is.name == was.name);
+                MethodComparison::new(was, is, demand)
             })
             .collect();
         Self {
@@ -99,7 +101,9 @@ impl Comparison {
     /// How many digests and metrics were compared, and how many of them failed.
     #[must_use]
     pub fn counts(&self) -> (usize, usize) {
-        let compared = self.methods.iter().map(|method| 1 + method.quality.len()).sum();
+        let of =
+            |method: &MethodComparison| usize::from(method.digest.is_asked) + method.quality.len();
+        let compared = self.methods.iter().map(of).sum();
         (compared, self.methods.iter().map(MethodComparison::failures).sum())
     }
 
@@ -110,12 +114,13 @@ impl Comparison {
         let verdict = |passed: bool| if passed { "ok" } else { "FAILED" };
         for MethodComparison { name, digest, quality } in &self.methods {
             text += &format!("\n{name}\n");
-            let mut line = |passed: bool, name: &str, said: &str| {
-                text += &format!("  {:<7} {name:<19} {said}\n", verdict(passed));
+            let mut line = |verdict: &str, name: &str, said: &str| {
+                text += &format!("  {verdict:<7} {name:<19} {said}\n");
             };
-            line(digest.passed, "digest", &digest.to_text());
+            let of_digest = if digest.is_asked { verdict(digest.passed) } else { "skipped" };
+            line(of_digest, "digest", &digest.to_text());
             for metric in quality {
-                line(metric.passed, metric.metric.name(), &metric.to_text());
+                line(verdict(metric.passed), metric.metric.name(), &metric.to_text());
             }
         }
         text
@@ -123,21 +128,23 @@ impl Comparison {
 }
 
 impl MethodComparison {
-    fn new(was: &MethodBaseline, is: &MethodBaseline, demand: Demand) -> Self {
+    fn new(was: &MethodBaseline, is: Option<&MethodBaseline>, demand: Demand) -> Self {
+        let is_asked = demand == Demand::SameBytes;
+        let found = is.map(|is| is.digest.clone());
         let digest = DigestComparison {
-            passed: demand == Demand::Quality || was.digest == is.digest,
+            is_asked,
+            passed: !is_asked || found.as_ref() == Some(&was.digest),
             baseline: was.digest.clone(),
-            found: is.digest.clone(),
+            found,
         };
-        let compare = |metric: Metric| {
-            let baseline = was.quality.of(metric)?;
-            let (found, tolerance) = (is.quality.of(metric), metric.tolerance());
+        let quality = Metric::ALL.map(|metric| {
+            let (baseline, tolerance) = (was.quality.of(metric), metric.tolerance());
+            let found = is.map(|is| is.quality.of(metric));
             // Written so that NaN fails it.
             let passed = found.is_some_and(|found| metric.loss(baseline, found) <= tolerance);
-            Some(MetricComparison { passed, metric, baseline, found, tolerance })
-        };
-        let quality = Metric::ALL.into_iter().filter_map(compare).collect();
-        Self { name: was.name.clone(), digest, quality }
+            MetricComparison { passed, metric, baseline, found, tolerance }
+        });
+        Self { name: was.name.clone(), digest, quality: quality.into() }
     }
 
     fn failures(&self) -> usize {
@@ -150,9 +157,10 @@ impl DigestComparison {
     /// What was expected and what was found.
     #[must_use]
     pub fn to_text(&self) -> String {
-        let Self { passed, baseline, found } = self;
+        let Self { passed, baseline, found, .. } = self;
+        let found = found.as_deref().unwrap_or("none");
         match (baseline == found, passed) {
-            (true, _) => found.clone(),
+            (true, _) => found.to_owned(),
             (false, true) => format!("{found}, was {baseline}"),
             (false, false) => format!("expected {baseline}, found {found}"),
         }

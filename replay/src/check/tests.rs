@@ -3,7 +3,14 @@
 use super::*;
 
 fn method(name: &str, digest: char, psnr: f64, flip: f64) -> MethodBaseline {
-    let quality = Quality { psnr_rgb_db: Some(psnr), flip: Some(flip), ..Quality::default() };
+    let quality = Quality {
+        psnr_rgb_db: psnr,
+        psnr_y_db: 31.0,
+        ssim: 0.9,
+        flip,
+        worst_tile_psnr_db: 12.0,
+        error_flicker: 1.0,
+    };
     MethodBaseline { name: name.into(), digest: digest.to_string().repeat(32), quality }
 }
 
@@ -11,10 +18,10 @@ fn baseline(methods: &[MethodBaseline]) -> Baseline {
     Baseline {
         foreframe_baseline: 1,
         version: "0.1.0".into(),
-        capture: "a <cart> & \"co\"".into(),
+        capture: "a <cart> & \"co\"\u{1b}".into(),
         ratio: 4,
         frames: 36,
-        truth: "ab".repeat(16),
+        content: "ab".repeat(16),
         methods: methods.to_vec(),
     }
 }
@@ -43,7 +50,7 @@ fn the_same_passes_and_what_the_baseline_lacks_is_not_asked() {
     ];
     let comparison = compared(&same, Demand::SameBytes);
     assert!(comparison.passed);
-    assert_eq!(comparison.counts(), (6, 0));
+    assert_eq!(comparison.counts(), (14, 0));
 }
 
 #[test]
@@ -52,7 +59,9 @@ fn other_bytes_fail_unless_quality_alone_is_asked_for() {
     let strict = compared(&other, Demand::SameBytes);
     assert_eq!((strict.passed, failed(&strict)), (false, vec!["auto digest".to_owned()]));
     let lenient = compared(&other, Demand::Quality);
-    assert!(lenient.passed && lenient.methods[1].digest.found.starts_with('c'));
+    assert!(lenient.passed && lenient.methods[1].digest.found.as_ref().unwrap().starts_with('c'));
+    assert_eq!(lenient.counts(), (12, 0), "digests are not asked for");
+    assert!(lenient.to_text().contains("skipped digest"), "{}", lenient.to_text());
 }
 
 #[test]
@@ -71,17 +80,32 @@ fn quality_may_be_lost_by_the_tolerance_and_no_more_in_its_own_direction() {
 }
 
 #[test]
+fn what_nobody_sees_of_a_nearly_exact_picture_is_no_loss() {
+    let loss = |was: f64, is: f64| Metric::PsnrRgbDb.loss(was, is);
+    assert_eq!((loss(100.0, 68.0), loss(100.0, 49.0), loss(30.0, 100.0)), (0.0, 1.0, -20.0));
+    assert!(loss(100.0, f64::NAN).is_nan());
+}
+
+#[test]
+fn a_method_that_was_not_run_fails() {
+    let comparison = compared(&[method("linear", 'a', 30.0, 0.1)], Demand::Quality);
+    assert!(!comparison.passed);
+    assert_eq!(failed(&comparison).len(), 6);
+    assert!(comparison.to_text().contains("found nothing to measure"));
+}
+
+#[test]
 fn junit_has_a_case_for_each_and_says_what_failed_with_names_escaped() {
     let found = [method("linear", 'a', 29.0, 0.1), method("auto", 'c', 32.0, 0.09)];
     let xml = junit(&compared(&found, Demand::SameBytes)).unwrap();
-    let suite =
-        "<testsuite name=\"a &lt;cart&gt; &amp; &quot;co&quot;\" tests=\"6\" failures=\"2\">";
+    let suite = "<testsuite name=\"a &lt;cart&gt; &amp; &quot;co&quot;\" tests=\"14\" failures=\"2\" skipped=\"0\">";
     assert!(xml.contains(suite), "{xml}");
-    assert_eq!(xml.matches("<testcase ").count(), 6);
+    assert_eq!(xml.matches("<testcase ").count(), 14);
     assert_eq!(xml.matches("</failure>").count(), 2);
     assert!(xml.contains("expected 30.0000 to within 0.05, found 29.0000"), "{xml}");
     let passed = junit(&compared(&found, Demand::Quality)).unwrap();
-    assert_eq!(passed.matches("</failure>").count(), 1);
+    let count = |tag: &str| passed.matches(tag).count();
+    assert_eq!((count("</failure>"), count("<skipped/>"), count("skipped=\"2\"")), (1, 2, 1));
 }
 
 #[test]

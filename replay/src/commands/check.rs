@@ -1,10 +1,11 @@
 //! `foreframe check`: whether the engine still makes of a capture what it made before.
 
 use std::fs;
+use std::io::Write as _;
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, bail};
+use anyhow::{Context as _, bail, ensure};
 use foreframe_engine::backend::choice::BackendChoice;
 use foreframe_engine::{FinishConfig, Method};
 use foreframed::{clock, gpu};
@@ -17,6 +18,7 @@ use crate::output::Output;
 use crate::recording::Recording as _;
 use crate::recording::capture::CaptureRecording;
 use crate::score::run::{ScoreOptions, score_recording};
+use crate::whole_file;
 
 /// Arguments of `foreframe check`.
 #[derive(clap::Args, Debug)]
@@ -29,8 +31,8 @@ number of threads.
     foreframe check cart.mcap --baseline cart.json --write
     foreframe check cart.mcap --baseline cart.json --junit cart.xml
 
-Quality may be lost by 0.05 dB of PSNR, 0.5 dB in the worst tile, 0.001 of SSIM and of FLIP and
-0.05 levels of flicker. After a change of Foreframe that is meant to change pictures,
+Quality may be lost by 0.05 dB of PSNR below 50 dB, 0.5 dB in the worst tile, 0.001 of SSIM and
+of FLIP and 0.05 levels of flicker. After a change of Foreframe that is meant to change pictures,
 --quality-alone asks whether they became worse.
 
 Exit code 1: bytes or quality are not what they were.")]
@@ -85,10 +87,16 @@ struct Written<'a> {
 /// If a file cannot be read or written, the baseline is of another capture, or something regressed.
 pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
     let file = args.baseline.display();
+    ensure_three_files(args)?;
     if args.write {
+        Baseline::ensure_replaceable(&args.baseline)?;
+        let mut written = whole_file::beside(&args.baseline)?;
         let methods = args.methods.as_ref().map_or(METHODS.to_vec(), |methods| methods.0.clone());
         let found = measure(args, output, args.ratio.unwrap_or(RATIO), methods)?;
-        found.write(&args.baseline)?;
+        written
+            .write_all(found.to_text()?.as_bytes())
+            .with_context(|| format!("writing {file}"))?;
+        whole_file::put(written, &args.baseline)?;
         let text = format!(
             "{file}: {} frames of `{}` by {} methods",
             found.frames,
@@ -99,6 +107,10 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
     }
     let baseline = Baseline::read(&args.baseline)?;
     let (ratio, methods) = baseline.asks_for().with_context(|| file.to_string())?;
+    if let Some(path) = &args.junit {
+        // What it says is never of a run before.
+        fs::write(path, "").with_context(|| format!("writing {}", path.display()))?;
+    }
     let found = measure(args, output, ratio, methods)?;
     baseline.ensure_same_capture(&found).with_context(|| file.to_string())?;
     let demand = if args.quality_alone { Demand::Quality } else { Demand::SameBytes };
@@ -115,6 +127,23 @@ pub fn run(args: &Args, output: &Output) -> anyhow::Result<()> {
              anew",
             args.capture.display()
         );
+    }
+    Ok(())
+}
+
+/// That no file would be written over another of them.
+fn ensure_three_files(args: &Args) -> anyhow::Result<()> {
+    let mut files = vec![("capture", &args.capture), ("--baseline", &args.baseline)];
+    files.extend(args.junit.iter().map(|path| ("--junit", path)));
+    let place = |path: &Path| fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    for (i, (name, path)) in files.iter().enumerate() {
+        for (other, other_path) in &files[..i] {
+            ensure!(
+                place(path) != place(other_path),
+                "{name}: expected another file than that of {other}, found {}",
+                path.display()
+            );
+        }
     }
     Ok(())
 }
@@ -148,11 +177,10 @@ fn measure(
     let score = score_recording(&name, &mut recording, &options, || progress.inc(1))
         .with_context(|| format!("checking {path}"))?;
     progress.finish_and_clear();
-    let found = Baseline::new(&score);
-    if found.frames == 0 {
-        bail!(
-            "{path}: expected frames between two keys, found none: --ratio {ratio} leaves out too few"
-        );
-    }
-    Ok(found)
+    let content = recording.content_hash()?;
+    Baseline::new(&score, content).with_context(|| {
+        format!(
+            "{path}: expected frames between two keys, found none: of {ratio} frames one is a key"
+        )
+    })
 }

@@ -23,6 +23,7 @@ use super::exported::{self, Exported};
 use super::image::ExrImage;
 use super::sidecar::{self, Sidecar};
 use super::sky::SkyMotion;
+use crate::whole_file;
 
 /// Content time of time 0 of a sequence. Motion of its first frames points further back, and no
 /// time is negative.
@@ -83,9 +84,7 @@ pub fn import(
     let name = options.name.clone().unwrap_or_else(|| sequence.name());
     let session =
         SessionInfo::new(name, CaptureSource::Import).with_config("time_origin_ns", ORIGIN_NS);
-    let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty());
-    let file = tempfile::NamedTempFile::new_in(parent.unwrap_or(Path::new(".")))
-        .with_context(|| format!("creating a file beside {}", out.display()))?;
+    let file = whole_file::beside(out)?;
     let mut writer =
         CaptureWriter::to_writer(BufWriter::new(file), &session)?.with_coding(options.coding);
     let format = sequence.format;
@@ -111,9 +110,7 @@ pub fn import(
         progress(imported.frames, all);
     }
     let file = writer.finish()?.into_inner().context("writing the capture")?;
-    file.persist(out)
-        .map_err(|failed| failed.error)
-        .with_context(|| format!("writing {}", out.display()))?;
+    whole_file::put(file, out)?;
     Ok(imported)
 }
 

@@ -97,6 +97,15 @@ impl<S: ReadAt> CaptureRecording<S> {
         &self.capture.session().name
     }
 
+    /// A hash of its format and of all that its frames show, 32 hexadecimal digits: what tells it
+    /// from any other.
+    ///
+    /// # Errors
+    /// If a frame's record cannot be read.
+    pub fn content_hash(&self) -> anyhow::Result<String> {
+        Ok(format!("{:032x}", self.capture.content_hash(self.stream)?))
+    }
+
     /// The angular size of a pixel that the daemon worked with when it recorded. None where it had
     /// none, or the capture comes from elsewhere.
     ///

@@ -34,8 +34,6 @@ pub struct CaptureScore {
     pub ratio: usize,
     /// How many keys.
     pub keys: usize,
-    /// The digest of the true frames to predict, 32 hexadecimal digits.
-    pub truth_digest: String,
     /// Frames from a cut to the next key, which are not predicted.
     pub left_out: usize,
     /// Where the motion of the keys came from.
@@ -342,7 +340,6 @@ pub(super) mod tests {
             height: 360,
             ratio: 3,
             keys: 13,
-            truth_digest: String::new(),
             left_out: 2,
             key_motion: MotionCounts { own: 1, composed: 10, missing: 2 },
             methods: vec![score(psnr)],

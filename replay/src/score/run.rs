@@ -30,7 +30,6 @@ use super::tally::{FrameScore, MethodTally, Truth};
 use crate::recording::keys::KeyReader;
 use crate::recording::plan::{MotionSource, Plan};
 use crate::recording::{Frame, Recording, Wanted};
-use crate::virtual_time::digest::FrameDigester;
 
 /// What to score and how.
 #[derive(Clone, Debug)]
@@ -67,6 +66,10 @@ pub fn score_recording(
 ) -> anyhow::Result<CaptureScore> {
     let plan = Plan::new(recording.heads(), options.ratio);
     ensure!(!plan.keys.is_empty(), "expected at least one whole frame, found no frames");
+    // A larger ratio leaves one key as well, and would have lists of that many phases.
+    let asked = options.ratio;
+    let most = NonZeroUsize::MIN.saturating_add(recording.heads().len());
+    let options = &ScoreOptions { ratio: asked.min(most), ..options.clone() };
     let reader = KeyReader::new(recording.format(), &plan)?;
     let format = *reader.format();
     let converter = SrgbConverter::new(&format);
@@ -136,9 +139,8 @@ pub fn score_recording(
         name: name.to_owned(),
         width: format.width,
         height: format.height,
-        ratio: options.ratio.get(),
+        ratio: asked.get(),
         keys: plan.keys.len(),
-        truth_digest: truths.digester.all(),
         left_out: (0..plan.keys.len()).map(|key| plan.left_out(key)).sum(),
         key_motion: count_motion(&plan),
         methods: runs
@@ -370,7 +372,6 @@ struct TruthReader {
     converter: SrgbConverter,
     engine: Engine,
     picture: ColorPlane,
-    digester: FrameDigester,
 }
 
 impl TruthReader {
@@ -380,7 +381,7 @@ impl TruthReader {
         let engine = engine_of(Method::Hold, gpu, format, &options);
         let converter = SrgbConverter::new(&format);
         let picture = ColorPlane::Rgba8(Plane::default());
-        Self { converter, engine, picture, digester: FrameDigester::default() }
+        Self { converter, engine, picture }
     }
 
     fn read(&mut self, recording: &mut dyn Recording, frame: usize) -> anyhow::Result<Srgb8> {
@@ -390,7 +391,6 @@ impl TruthReader {
         self.engine
             .synthesise(truth.content_time, &mut self.picture)
             .context("the engine has no key")?;
-        self.digester.add(&self.picture);
         Ok(to_srgb8(&self.picture, &self.converter))
     }
 }
