@@ -1,7 +1,7 @@
 //! The file that a capture is compared with: JSON with one line per value, for version control.
 
-use std::fs;
-use std::io::ErrorKind;
+use std::fs::{self, File};
+use std::io::{BufReader, ErrorKind};
 use std::num::NonZeroUsize;
 use std::path::Path;
 
@@ -109,10 +109,14 @@ impl Baseline {
     /// # Errors
     /// If something else is there.
     pub fn ensure_replaceable(path: &Path) -> anyhow::Result<()> {
-        let is_baseline = match fs::read(path) {
-            Err(error) if error.kind() == ErrorKind::NotFound => true,
-            Err(_) => false,
-            Ok(bytes) => serde_json::from_slice::<Head>(&bytes).is_ok(),
+        let is_baseline = match fs::metadata(path) {
+            Err(error) => error.kind() == ErrorKind::NotFound,
+            // Of a device there may be no end, and of a capture the first byte tells.
+            Ok(found) => {
+                let file = found.is_file().then(|| File::open(path).ok()).flatten();
+                let head = |file| serde_json::from_reader::<_, Head>(BufReader::new(file));
+                file.is_some_and(|file| head(file).is_ok())
+            }
         };
         ensure!(is_baseline, "{}: expected a baseline or no file: it stays", path.display());
         Ok(())
@@ -236,7 +240,9 @@ mod tests {
             let said = Baseline::ensure_replaceable(&path).unwrap_err().to_string();
             assert!(said.contains("expected a baseline or no file"), "{said}");
         }
-        assert!(Baseline::ensure_replaceable(folder.path()).is_err());
+        for other in [folder.path(), Path::new("/dev/zero")] {
+            assert!(Baseline::ensure_replaceable(other).is_err(), "{}", other.display());
+        }
     }
 
     #[test]

@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::score::report::MethodScore;
 
-/// PSNR from which on no difference is seen, dB: less than one level of 256 everywhere.
+/// PSNR from which on none is a loss, dB: what differs is less than one level of 256 in the root
+/// mean square.
 const PERFECT_DB: f64 = 50.0;
 
 /// A metric of `score`.
@@ -62,7 +63,7 @@ impl Metric {
     }
 
     /// By how much `found` is worse than `baseline`; negative where it is better. Beyond
-    /// [`PERFECT_DB`] nothing is.
+    /// [`PERFECT_DB`] no PSNR is.
     #[must_use]
     pub fn loss(self, baseline: f64, found: f64) -> f64 {
         match self {

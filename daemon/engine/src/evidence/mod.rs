@@ -20,10 +20,10 @@
 //! Where the rungs have failed and most of a surface's motion is news, it may be a jump as well as
 //! a beginning: only that part of it goes on which was foreseen, along each axis of the picture for
 //! itself. The same holds of one axis alone along which holding would have been as good as every
-//! other rung, or better: what shakes up and down as it drives by goes on across, and not up. The rungs that follow
-//! the motion are then judged by (1) along the other axis. That limits overshoot where something
-//! turns back, and a vector that is wrong for one key moves nothing. Wrong vectors that stay are
-//! found by luma ([`trust`]).
+//! other rung, or better: what shakes up and down as it drives by goes on across, and not up. The
+//! rungs that follow the motion are then judged by (1) along the other axis. That limits overshoot
+//! where something turns back, and a vector that is wrong for one key moves nothing. Wrong vectors
+//! that stay are found by luma ([`trust`]).
 //!
 //! A shadow, a reflection and a texture that runs move otherwise than the surface that shows them.
 //! Where luma says so of two keys in a row, and flow explains what their motion does not
