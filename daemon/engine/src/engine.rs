@@ -28,7 +28,7 @@ use crate::phase::Phase;
 use crate::simd::Simd;
 use crate::time::{MonoSpan, MonoTime};
 use crate::trajectory::flow::Flow;
-use crate::trajectory::ladder::Ladder;
+use crate::trajectory::ladder::{Ladder, Past};
 use crate::ui::{UiInput, UiLayer, composite};
 use crate::warp::linear::{MOST_KEYS, kept_keys};
 
@@ -316,10 +316,10 @@ impl Engine {
             // Keys from before a change of method lack what the ladder keeps of a key.
             let is_known =
                 |key: &&KeyFrame| key.motion_from.is_none() || !key.displacement.data().is_empty();
-            let older = self.newest.as_ref().filter(|_| !key.is_cut).filter(is_known);
-            let oldest = self.previous.as_ref().filter(is_known);
+            let past = past_keys([&self.newest, &self.previous], &self.remembered);
+            let past = past.map(|older| older.filter(|_| !key.is_cut).filter(is_known));
             let flow = Some(&mut self.scratch.flow).filter(|_| !is_estimated);
-            ladder.take_key(&self.pool, flow, &mut key, older, oldest);
+            ladder.take_key(&self.pool, flow, &mut key, past);
             key.is_found_cut = ladder.evidence().is_cut();
         }
         if !key.velocity.data().is_empty() {
@@ -430,7 +430,8 @@ impl Engine {
     /// Brings the newest key's trajectories up to the late camera.
     fn catch_up(&mut self) {
         let Some((ladder, key)) = self.ladder.as_mut().zip(self.newest.as_mut()) else { return };
-        if ladder.catch_up(&self.pool, key, self.previous.as_ref()) {
+        let past = past_keys([&self.previous], &self.remembered);
+        if ladder.catch_up(&self.pool, key, past) {
             let method = self.config.method.warp();
             self.backend.take_field(&self.pool, method, key, &self.scratch.map);
             if let Some(finish) = &mut self.finish {
@@ -540,6 +541,15 @@ impl Engine {
         let work = (self.config.timer)() - started_at;
         Some((FrameReport { key_index: key.index, phase, work }, kept))
     }
+}
+
+/// The keys before one: those `kept` for themselves, the newest first, and then the others.
+fn past_keys<'a, const N: usize>(
+    kept: [&'a Option<KeyFrame>; N],
+    remembered: &'a [KeyFrame],
+) -> Past<'a> {
+    let mut keys = kept.into_iter().flatten().chain(remembered);
+    std::array::from_fn(|_| keys.next())
 }
 
 /// What continues the light of a stream of `method`.

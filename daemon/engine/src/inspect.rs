@@ -83,7 +83,7 @@ impl Inspection<'_> {
             (Method::Affine, _) => Rung::Affine,
             (Method::Quadratic, _) => Rung::Quadratic,
             (Method::Flow, _) => Rung::Flow,
-            (Method::World, Some(evidence)) => Rung::World(evidence.order()),
+            (Method::World, Some(evidence)) => Rung::World(evidence.mover_order()),
             (Method::Auto, Some(evidence)) if !evidence.samples().data().is_empty() => {
                 let depths = &self.key.depth;
                 let depth = if depths.data().is_empty() { 0 } else { depths.at(column, row) };

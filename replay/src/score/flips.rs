@@ -3,22 +3,22 @@
 
 use foreframe_engine::Plane;
 use foreframe_engine::inspect::Inspection;
-use foreframe_engine::trajectory::camera_path::CameraOrder;
 use foreframe_engine::trajectory::rung::Rung;
+use foreframe_engine::trajectory::world::MoverOrder;
 
 use super::picture::Srgb8;
 
 /// Widest picture that is kept, px. Wider ones are made smaller by a whole factor.
 pub const WIDEST: u32 = 400;
 
-/// The models, as maps of them count: a camera's order makes no other model.
+/// The models, as maps of them count: the order in which things move makes no other model.
 pub const RUNGS: [Rung; 7] = [
     Rung::Hold,
     Rung::Global,
     Rung::Linear,
     Rung::Affine,
     Rung::Quadratic,
-    Rung::World(CameraOrder::Constant),
+    Rung::World(MoverOrder::Constant),
     Rung::Flow,
 ];
 

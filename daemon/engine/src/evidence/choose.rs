@@ -8,7 +8,6 @@ use super::{Lead, MIXED, PerRung, RUNGS, Sample, bit_of, index_of, unproven};
 use crate::bands::for_each_row;
 use crate::lanes::both;
 use crate::plane::Plane;
-use crate::trajectory::camera_path::CameraOrder;
 use crate::trajectory::rung::Rung;
 use crate::trajectory::surface::is_same_surface;
 
@@ -34,7 +33,6 @@ const HYSTERESIS: f32 = 3.0;
 /// Gives every sample its rung, and returns that of the image as a whole, which was `image`.
 pub(super) fn choose(
     pool: &ThreadPool,
-    order: CameraOrder,
     image: Rung,
     samples: &Plane<Sample>,
     leads: &mut Plane<Lead>,
@@ -47,7 +45,7 @@ pub(super) fn choose(
     }
     let mean = sum.map(|sum| sum / count);
     let tolerated = |rung| Preferred { rung, slack: None };
-    let image = cheapest(&mean, order, &[tolerated(image)]);
+    let image = cheapest(&mean, &[tolerated(image)]);
     for_each_row(
         pool,
         leads,
@@ -66,9 +64,9 @@ pub(super) fn choose(
                 };
                 lead.share = share;
                 lead.rung = if sample.keys > 1 {
-                    cheapest(&score, order, &[tolerated(sample.lead.rung), whole(count)])
+                    cheapest(&score, &[tolerated(sample.lead.rung), whole(count)])
                 } else {
-                    cheapest(&score, order, &[whole(count)])
+                    cheapest(&score, &[whole(count)])
                 };
             }
         },
@@ -229,14 +227,11 @@ struct Preferred {
 /// The first of `preferred` that is good enough, unless a cheaper one is as good as the best; else
 /// the cheapest rung within the tolerance of the best.
 #[inline(always)]
-fn cheapest(score: &PerRung, order: CameraOrder, preferred: &[Preferred]) -> Rung {
+fn cheapest(score: &PerRung, preferred: &[Preferred]) -> Rung {
     let linear = index_of(Rung::Linear);
-    let is_open = |rung: Rung| match (rung, index_of(rung)) {
-        (Rung::World(other), _) => other == order,
-        (_, index) if index < linear => {
-            score[index] <= GOOD || score[index] + CLEARLY < score[linear]
-        }
-        _ => true,
+    let is_open = |rung: Rung| {
+        let index = index_of(rung);
+        index >= linear || score[index] <= GOOD || score[index] + CLEARLY < score[linear]
     };
     let open = || RUNGS.into_iter().zip(score).filter(|(rung, _)| is_open(*rung));
     let best = open().map(|(_, score)| *score).fold(f32::INFINITY, f32::min);
@@ -247,11 +242,10 @@ fn cheapest(score: &PerRung, order: CameraOrder, preferred: &[Preferred]) -> Run
     };
     let as_good = cheapest_within(tolerance / HYSTERESIS);
     for Preferred { rung, slack } in preferred {
-        let rung = if matches!(rung, Rung::World(_)) { Rung::World(order) } else { *rung };
         let slack = slack.unwrap_or(0.0).max(HYSTERESIS * tolerance);
-        let index = index_of(rung);
-        if is_open(rung) && score[index] <= best + slack && index <= index_of(as_good) {
-            return rung;
+        let index = index_of(*rung);
+        if is_open(*rung) && score[index] <= best + slack && index <= index_of(as_good) {
+            return *rung;
         }
     }
     cheapest_within(tolerance)
@@ -261,16 +255,14 @@ fn cheapest(score: &PerRung, order: CameraOrder, preferred: &[Preferred]) -> Run
 mod tests {
     use super::*;
 
-    const ORDER: CameraOrder = CameraOrder::Damped;
-
     /// The score with these numbers for hold, global, linear, affine, quadratic and the worlds;
     /// flow has nothing to say.
     fn score(of: [f32; 6]) -> PerRung {
-        [of[0], of[1], of[2], of[3], of[4], of[5], of[5], of[5], of[2]]
+        [of[0], of[1], of[2], of[3], of[4], of[5], of[5], of[2]]
     }
 
     fn in_use(score: &PerRung, rung: Rung) -> Rung {
-        cheapest(score, ORDER, &[Preferred { rung, slack: None }])
+        cheapest(score, &[Preferred { rung, slack: None }])
     }
 
     #[test]
@@ -301,17 +293,6 @@ mod tests {
     }
 
     #[test]
-    fn of_the_camera_orders_only_the_chosen_one_is_open() {
-        let mut world = score([0.5; 6]);
-        world[index_of(Rung::World(CameraOrder::Accelerated))] = 0.0;
-        assert_eq!(in_use(&world, Rung::Hold), Rung::Linear);
-        world[index_of(Rung::World(ORDER))] = 0.1;
-        assert_eq!(in_use(&world, Rung::Hold), Rung::World(ORDER));
-        let before = Rung::World(CameraOrder::Constant);
-        assert_eq!(in_use(&world, before), Rung::World(ORDER), "the order goes along");
-    }
-
-    #[test]
     fn a_lone_sample_is_judged_as_the_image_is_and_a_surface_for_itself() {
         let (turns, flies) =
             (score([0.9, 0.9, 0.6, 0.0, 0.6, 0.6]), score([0.9, 0.9, 0.0, 0.6, 0.6, 0.6]));
@@ -324,10 +305,10 @@ mod tests {
         let pool = crate::testing::pool(2);
         let mut leads = Plane::default();
         let lone = samples(|x, y| (x, y) == (10, 10));
-        assert_eq!(choose(&pool, ORDER, Rung::Hold, &lone, &mut leads), Rung::Linear);
+        assert_eq!(choose(&pool, Rung::Hold, &lone, &mut leads), Rung::Linear);
         assert_eq!(leads.at(10, 10).rung, Rung::Linear);
         let patch = samples(|x, y| x < 8 && y < 8);
-        choose(&pool, ORDER, Rung::Hold, &patch, &mut leads);
+        choose(&pool, Rung::Hold, &patch, &mut leads);
         assert_eq!((leads.at(3, 3).rung, leads.at(15, 15).rung), (Rung::Affine, Rung::Linear));
     }
 }

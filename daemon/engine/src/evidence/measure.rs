@@ -7,6 +7,7 @@
 
 use rayon::ThreadPool;
 
+use super::orders::OrderErrors;
 use super::{Lead, PerRung, RUNGS, STRIDE, Sample, WORLD, index_of};
 use crate::bands::for_each_row_of_two;
 use crate::key::KeyFrame;
@@ -19,6 +20,7 @@ use crate::trajectory::models::Models;
 use crate::trajectory::quadratic::Quadratic;
 use crate::trajectory::rung::Rung;
 use crate::trajectory::surface::{nearest_cell, was_same_surface};
+use crate::trajectory::world::MoverOrder;
 
 /// c of (2), pixels at the next key: an in-between frame in the middle has half of the error or
 /// less, and a picture loses most of its contrast where it is a pixel off.
@@ -64,8 +66,14 @@ pub(super) struct Trace {
 /// How far every rung was off, pixels.
 type OffPerRung = [[f32; 2]; RUNGS.len()];
 
-/// Errors of the camera's orders over samples that move with the world, and their number.
-pub(super) type OrderSums = [f32; CameraOrder::ALL.len() + 1];
+/// What a key shows of the orders that belong to the whole image.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub(super) struct Orders {
+    /// Of the camera, by what moves with the world.
+    pub(super) camera: OrderErrors<{ CameraOrder::ALL.len() }>,
+    /// Of movers, by what moves on its own.
+    pub(super) movers: OrderErrors<{ MoverOrder::ALL.len() }>,
+}
 
 /// What a key shows at a sample.
 struct Seen {
@@ -115,8 +123,8 @@ impl Measuring<'_> {
         });
     }
 
-    /// Makes the samples of the new key and returns what the still ones among those measured by the
-    /// whole ladder show of the camera's orders. Rungs are left as they were on the surface.
+    /// Makes the samples of the new key and returns what those measured by the whole ladder show of
+    /// the orders. Rungs are left as they were on the surface.
     pub(super) fn measure(
         &self,
         pool: &ThreadPool,
@@ -124,7 +132,7 @@ impl Measuring<'_> {
         is_still: impl Fn(u32, u32) -> bool + Sync,
         traces: &mut Plane<Trace>,
         samples: &mut Plane<Sample>,
-    ) -> OrderSums {
+    ) -> Orders {
         let [columns, rows] = self.lattice.points();
         samples.resize(columns, rows);
         traces.resize(columns, rows);
@@ -143,8 +151,8 @@ impl Measuring<'_> {
         );
         fit_affine(pool, predictions, traces);
         let known = &*predictions;
-        let mut sums = Plane::new(1, rows);
-        for_each_row_of_two(pool, samples, &mut sums, |row, samples, sums: &mut [OrderSums]| {
+        let mut orders = Plane::new(1, rows);
+        for_each_row_of_two(pool, samples, &mut orders, |row, samples, orders: &mut [Orders]| {
             let traces = traces.row(row);
             for (column, (sample, trace)) in (0..).zip(samples.iter_mut().zip(traces)) {
                 if !trace.needs_all {
@@ -162,19 +170,16 @@ impl Measuring<'_> {
                 let history = self.history(trace.cell, sample.depth);
                 self.take_in(sample, history, &now, |_| true);
                 if moves_with_world {
-                    let of_orders = &now[WORLD..][..CameraOrder::ALL.len()];
-                    for (sum, error) in sums[0].iter_mut().zip(of_orders) {
-                        *sum += error;
-                    }
-                    sums[0][CameraOrder::ALL.len()] += 1.0;
+                    orders[0].camera.add(errors_of_camera(known, trace.cell, d));
+                } else if !is_flow {
+                    orders[0].movers.add(std::array::from_fn(|order| now[WORLD + order]));
                 }
             }
         });
-        let mut total = OrderSums::default();
-        for sums in sums.data() {
-            for (total, sum) in total.iter_mut().zip(sums) {
-                *total += sum;
-            }
+        let mut total = Orders::default();
+        for orders in orders.data() {
+            total.camera.merge(&orders.camera);
+            total.movers.merge(&orders.movers);
         }
         total
     }
@@ -390,6 +395,22 @@ fn all_off(predictions: &Predictions<'_>, cell: [u16; 2], d: [f32; 2]) -> OffPer
         }
         let predicted = predicted(predictions, rung, cell).unwrap_or(straight);
         both(|axis| predicted[axis] - d[axis])
+    })
+}
+
+/// (1) and (2) of the camera's orders, where a cell moves with the world.
+#[inline(always)]
+fn errors_of_camera(
+    predictions: &Predictions<'_>,
+    [x, y]: [u16; 2],
+    d: [f32; 2],
+) -> [f32; CameraOrder::ALL.len()] {
+    let Predictions { key, models, older, phase } = predictions;
+    let [x, y] = [x, y].map(u32::from);
+    let straight = straight(predictions, x, y);
+    CameraOrder::ALL.map(|order| {
+        let curve = models.curve_by(order, key, *older, x, y);
+        error(curve.map_or(straight, |curve| curve.at(*phase)), d)
     })
 }
 

@@ -12,7 +12,9 @@
 //! ```
 //!
 //! The camera's order belongs to the whole image, and is chosen for it from those samples that move
-//! with the world ([`CameraOrder`]). Of the rungs the cheapest is taken whose S is within a
+//! with the world ([`CameraOrder`]). The order in which what moves besides goes on ([`MoverOrder`])
+//! makes two rungs; where every surface goes by `world` it is chosen for the whole image, too, from
+//! the samples that move on their own. Of the rungs the cheapest is taken whose S is within a
 //! tolerance of the best. The rung in use stays until it is worse by more, and the rung that the
 //! whole image would take, by the mean of m over it, is preferred the more, the fewer samples there
 //! are to judge a surface by.
@@ -41,6 +43,7 @@
 mod choose;
 mod eight;
 mod measure;
+mod orders;
 #[cfg(test)]
 mod tests;
 mod trust;
@@ -48,7 +51,8 @@ mod trust;
 use rayon::ThreadPool;
 
 pub use measure::Predictions;
-use measure::{Measuring, OrderSums, Trace};
+use measure::{Measuring, Trace};
+use orders::OrderChoice;
 use trust::Trust;
 
 use crate::key::KeyFrame;
@@ -58,20 +62,20 @@ pub use crate::trajectory::lattice::STRIDE;
 use crate::trajectory::models::Models;
 use crate::trajectory::rung::Rung;
 use crate::trajectory::surface::is_same_surface;
+use crate::trajectory::world::MoverOrder;
 
 /// The rungs that are measured, cheapest first.
-pub const RUNGS: [Rung; 9] = [
+pub const RUNGS: [Rung; 8] = [
     Rung::Hold,
     Rung::Global,
     Rung::Linear,
     Rung::Affine,
     Rung::Quadratic,
-    Rung::World(CameraOrder::Constant),
-    Rung::World(CameraOrder::Damped),
-    Rung::World(CameraOrder::Accelerated),
+    Rung::World(MoverOrder::Constant),
+    Rung::World(MoverOrder::Accelerated),
     Rung::Flow,
 ];
-/// The place of the first of the camera's orders.
+/// The place of the first of the orders of movers.
 const WORLD: usize = 5;
 /// A number per rung.
 pub type PerRung = [f32; RUNGS.len()];
@@ -87,7 +91,7 @@ pub const fn index_of(rung: Rung) -> usize {
         Rung::Affine => 3,
         Rung::Quadratic => 4,
         Rung::World(order) => WORLD + order as usize,
-        Rung::Flow => 8,
+        Rung::Flow => 7,
     }
 }
 
@@ -204,9 +208,10 @@ pub struct Evidence {
     is_at_rest: bool,
     /// Keys taken in.
     count: u32,
-    order: CameraOrder,
-    /// Error (2) of each order over the still world, averaged over keys.
-    order_errors: Option<[f32; CameraOrder::ALL.len()]>,
+    /// By the still world.
+    order: OrderChoice<{ CameraOrder::ALL.len() }>,
+    /// By what moves on its own.
+    mover_order: OrderChoice<{ MoverOrder::ALL.len() }>,
     /// The rung of the image as a whole.
     image_rung: Rung,
 }
@@ -225,8 +230,8 @@ impl Default for Evidence {
             trust: Trust::default(),
             is_at_rest: false,
             count: 0,
-            order: CameraOrder::default(),
-            order_errors: None,
+            order: OrderChoice::default(),
+            mover_order: OrderChoice::default(),
             image_rung: Rung::Affine,
         }
     }
@@ -266,7 +271,8 @@ impl Evidence {
                 }
                 let (traces, samples) = (&mut self.traces, &mut self.samples);
                 let sums = measuring.measure(pool, predictions, is_still, traces, samples);
-                self.choose_order(&sums);
+                self.order.take_in(&sums.camera);
+                self.mover_order.take_in(&sums.movers);
             }
             None => measuring.begin(pool, &mut self.samples),
         }
@@ -277,8 +283,8 @@ impl Evidence {
 
     /// Gives every sample its rung.
     fn choose_rungs(&mut self, pool: &ThreadPool, models: &Models) {
-        let Self { samples, leads, whole, shared, taken, trust, order, image_rung, .. } = self;
-        *image_rung = choose::choose(pool, *order, *image_rung, samples, leads);
+        let Self { samples, leads, whole, shared, taken, trust, image_rung, .. } = self;
+        *image_rung = choose::choose(pool, *image_rung, samples, leads);
         // The next key's history.
         for (sample, lead) in samples.data_mut().iter_mut().zip(leads.data()) {
             sample.lead = *lead;
@@ -355,7 +361,13 @@ impl Evidence {
     /// How the camera goes on best.
     #[must_use]
     pub fn order(&self) -> CameraOrder {
-        self.order
+        CameraOrder::ALL[self.order.in_use()]
+    }
+
+    /// How what moves on its own goes on best, by all of it together.
+    #[must_use]
+    pub fn mover_order(&self) -> MoverOrder {
+        MoverOrder::ALL[self.mover_order.in_use()]
     }
 
     /// The samples of the newest key.
@@ -412,30 +424,4 @@ impl Evidence {
             None => Lead::by(Rung::Hold),
         }
     }
-
-    /// Chooses the camera's order from the still samples that have just been measured.
-    fn choose_order(&mut self, sums: &OrderSums) {
-        const ORDERS: usize = CameraOrder::ALL.len();
-        let count = sums[ORDERS];
-        if count == 0.0 {
-            return;
-        }
-        let now: [f32; ORDERS] = std::array::from_fn(|order| sums[order] / count);
-        let errors = match self.order_errors {
-            Some(before) => std::array::from_fn(|i| 0.5 * (before[i] + now[i])),
-            None => now,
-        };
-        self.order_errors = Some(errors);
-        let error = |order: CameraOrder| errors[order as usize];
-        for order in CameraOrder::ALL {
-            if error(order) < error(self.order) * (1.0 - ORDER_HYSTERESIS) - ORDER_TOLERANCE {
-                self.order = order;
-            }
-        }
-    }
 }
-
-/// Part of its error by which another order has to be better than the one in use.
-const ORDER_HYSTERESIS: f32 = 0.1;
-/// And the least difference of (2) that counts: that of a twentieth of a pixel.
-const ORDER_TOLERANCE: f32 = 0.000_6;

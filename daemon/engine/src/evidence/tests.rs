@@ -42,9 +42,9 @@ fn climbed(method: Method, keys: impl Iterator<Item = KeyFrame>) -> (Ladder, Key
     let mut ladder = Ladder::new(method, None).unwrap();
     let mut taken: Vec<KeyFrame> = Vec::new();
     for mut key in keys {
-        let [older, before] = [1, 2].map(|back| taken.len().checked_sub(back).map(|i| &taken[i]));
-        let older = older.filter(|_| !key.is_cut);
-        ladder.take_key(&pool(2), None, &mut key, older, before);
+        let past = [1, 2, 3].map(|back| taken.len().checked_sub(back).map(|i| &taken[i]));
+        let past = past.map(|older| older.filter(|_| !key.is_cut));
+        ladder.take_key(&pool(2), None, &mut key, past);
         taken.push(key);
     }
     (ladder, taken.pop().unwrap())
@@ -187,6 +187,42 @@ fn the_order_of_the_camera_is_the_one_that_would_have_met_the_keys() {
     assert_eq!(ladder.evidence().order(), CameraOrder::Constant);
 }
 
+/// Keys of a wall that comes straight at a camera which stands still, `distance` away at each key.
+fn approaching(distance: fn(i64) -> f32) -> impl Iterator<Item = KeyFrame> {
+    (0..7).map(move |index| {
+        let (now, then) = (distance(index), distance(index - 1));
+        let per_depth_key = 2.0 / u32::MAX as f32;
+        let was = |at: u32, axis: usize| {
+            let middle = 0.5 * (SIZE[axis] as f32 - 1.0);
+            middle + (at as f32 - middle) * now / then
+        };
+        KeyFrame {
+            camera: Some(camera(0.0, 0.0)),
+            motion_from_camera: Some(camera(0.0, 0.0)),
+            inverse_distance_per_depth_key: Some(per_depth_key),
+            ..key(index, |_, _| (1.0 / now / per_depth_key) as u32, |x, y| [was(x, 0), was(y, 1)])
+        }
+    })
+}
+
+#[test]
+fn what_comes_nearer_ever_faster_goes_on_to_where_it_will_be() {
+    let hurrying = |index: i64| 20.0 - 0.1 * (index * index) as f32;
+    let (ladder, last) = climbed(Method::World, approaching(hurrying));
+    assert_eq!(ladder.evidence().mover_order(), MoverOrder::Accelerated);
+    let (velocity, acceleration) = (last.velocity.at(110, 44), last.acceleration.at(110, 44));
+    let goes = (f32::from(velocity.x) + 0.5 * f32::from(acceleration.x)) / 32.0;
+    let expected = (110.0 - 59.5) * (hurrying(6) / hurrying(7) - 1.0);
+    assert!((goes - expected).abs() < 0.1, "expected {expected} px, found {goes}");
+
+    let steady = |index: i64| 20.0 - 0.7 * index as f32;
+    let (ladder, _) = climbed(Method::World, approaching(steady));
+    assert_eq!(ladder.evidence().mover_order(), MoverOrder::Constant);
+    let faltering = |index: i64| 20.0 - 0.7 * index as f32 - 0.3 * (index % 2) as f32;
+    let (ladder, _) = climbed(Method::World, approaching(faltering));
+    assert_eq!(ladder.evidence().mover_order(), MoverOrder::Constant);
+}
+
 #[test]
 fn a_late_camera_leads_what_moves_with_the_world_and_the_newest_pose_wins() {
     let steady = |index: i64| camera(0.0, 0.5 * index as f64);
@@ -195,16 +231,16 @@ fn a_late_camera_leads_what_moves_with_the_world_and_the_newest_pose_wins() {
         let predicted = key.velocity.at(60, 44);
         let at = |ms| MonoTime::ZERO + INTERVAL.scale(6, 1) + MonoSpan::from_ms(ms);
         ladder.late_camera(at(10), camera(0.05, 3.3).view);
-        assert!(ladder.catch_up(&pool(1), &mut key, None), "{method}");
+        assert!(ladder.catch_up(&pool(1), &mut key, [None; 3]), "{method}");
         let told = key.velocity.at(60, 44);
         assert_ne!(told, predicted, "{method}");
-        assert!(!ladder.catch_up(&pool(1), &mut key, None), "nothing is new");
+        assert!(!ladder.catch_up(&pool(1), &mut key, [None; 3]), "nothing is new");
         for older in [at(10), at(5), at(-30)] {
             ladder.late_camera(older, camera(-0.2, 9.0).view);
-            assert!(!ladder.catch_up(&pool(1), &mut key, None), "an older pose is no news");
+            assert!(!ladder.catch_up(&pool(1), &mut key, [None; 3]), "an older pose is no news");
         }
         ladder.late_camera(at(15), camera(-0.05, 3.6).view);
-        assert!(ladder.catch_up(&pool(1), &mut key, None));
+        assert!(ladder.catch_up(&pool(1), &mut key, [None; 3]));
         assert_ne!(key.velocity.at(60, 44), told);
     }
 }
@@ -215,7 +251,7 @@ fn a_late_pose_is_where_the_picture_goes() {
     let (mut ladder, mut key) = climbed(Method::Auto, seen(steady));
     let late = camera(0.04, 3.9);
     ladder.late_camera(MonoTime::ZERO + INTERVAL.scale(7, 1), late.view);
-    assert!(ladder.catch_up(&pool(1), &mut key, None));
+    assert!(ladder.catch_up(&pool(1), &mut key, [None; 3]));
     let there = between(&steady(6), &late, Rect::full(SIZE[0], SIZE[1])).unwrap();
     for (x, y) in [(60, 44), (20, 70), (100, 12)] {
         let expected = there.place([x as f32, y as f32], 1.0 / 20.0);
@@ -348,8 +384,8 @@ fn what_runs_over_a_still_surface_is_followed_by_its_flow_and_the_rest_is_not() 
     let (mut ladder, mut flow) = (Ladder::new(Method::Auto, None).unwrap(), Flow::default());
     let mut taken: Vec<KeyFrame> = Vec::new();
     for mut key in keys {
-        let [older, before] = [1, 2].map(|back| taken.len().checked_sub(back).map(|i| &taken[i]));
-        ladder.take_key(&pool(2), Some(&mut flow), &mut key, older, before);
+        let past = [1, 2, 3].map(|back| taken.len().checked_sub(back).map(|i| &taken[i]));
+        ladder.take_key(&pool(2), Some(&mut flow), &mut key, past);
         taken.push(key);
     }
     let newest = taken.pop().unwrap();

@@ -97,8 +97,8 @@ impl Filling<'_> {
                     done += LATTICE_CELLS;
                 }
             }
-            Rung::World(order) if !is_damped => {
-                if let Some(world) = self.models.world(order) {
+            Rung::World(_) if !is_damped => {
+                if let Some(world) = self.models.world() {
                     while done + WORLD_CELLS <= cells {
                         let x = run.x + done as u32;
                         match world.still_curves::<WORLD_CELLS>(self.key, grid, x, run.y) {

@@ -12,7 +12,7 @@ use rayon::ThreadPool;
 use rayon::iter::ParallelIterator;
 use rayon::slice::ParallelSlice;
 
-use super::camera_path::{CameraOrder, CameraPath, Pose};
+use super::camera_path::{CameraOrder, CameraPath, Onward, Pose};
 use super::dilate_motion::dilate_cells;
 use super::fill::{Filling, Run};
 use super::flow::Flow;
@@ -22,7 +22,7 @@ use super::lattice::{Lattice, STRIDE, middle};
 use super::models::Models;
 use super::quadratic::Quadratic;
 use super::rung::Rung;
-use super::world::World;
+use super::world::{MoverOrder, World};
 use crate::bands::for_each_row_of_two;
 use crate::evidence::{Evidence, Lead, Predictions};
 use crate::key::{Acceleration, Camera, KeyFrame, Velocity};
@@ -35,6 +35,9 @@ use crate::time::MonoTime;
 const STILL_RUN: usize = 256;
 /// Cells that are worth waking a thread for.
 const STILL_PART: usize = 1 << 16;
+
+/// The keys before one, the newest first, as many as it takes to say how that had gone on.
+pub type Past<'a> = [Option<&'a KeyFrame>; 3];
 
 /// Who says which rung a cell takes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -114,16 +117,15 @@ impl Ladder {
         self.models.failed.at(at).is_some()
     }
 
-    /// Gives `key` its trajectories. It was decoded with its displacement; `older` is the key
-    /// before it, unless this one is a cut, and `before` the one before that. `flow` looks at the
-    /// pictures where motion was not estimated from them already.
+    /// Gives `key` its trajectories. It was decoded with its displacement; `past` are the keys
+    /// before it, of which the first is left out where it is a cut. `flow` looks at the pictures
+    /// where motion was not estimated from them already.
     pub fn take_key(
         &mut self,
         pool: &ThreadPool,
         flow: Option<&mut Flow>,
         key: &mut KeyFrame,
-        older: Option<&KeyFrame>,
-        before: Option<&KeyFrame>,
+        past: Past<'_>,
     ) {
         if key.is_cut {
             self.path.cut();
@@ -141,7 +143,8 @@ impl Ladder {
             return;
         }
         self.is_still = is_still(pool, key);
-        let mut models = self.prepare(key);
+        let older = past[0];
+        let mut models = self.prepare(key, older);
         let followed = older.filter(|older| key.motion_from == Some(older.content_time));
         let mut looked = flow.zip(followed).filter(|_| self.choice == Choice::Evidence);
         let may_rest = self.is_still && self.late.is_none();
@@ -158,7 +161,7 @@ impl Ladder {
             });
             let rests = may_rest && is_explained;
             if !rests || !self.evidence.rest(models.lattice.points()) {
-                self.weigh(pool, key, &models, followed, before);
+                self.weigh(pool, key, &models, past);
             }
         }
         if self.evidence.is_cut() {
@@ -167,10 +170,11 @@ impl Ladder {
             self.path.cut();
             newest.into_iter().for_each(|pose| self.path.push(pose));
         }
+        models.order = self.evidence.order();
         self.fit_affine(pool, &mut models);
         self.spare = std::mem::replace(&mut self.models, models);
-        self.models.late = self.late_world(key);
-        self.fill(pool, key, older);
+        self.models.late = self.late_world(key, older);
+        self.fill(pool, key, past);
     }
 
     /// The client has moved the camera on to `view` at `time`, after its newest key. The newest
@@ -186,42 +190,42 @@ impl Ladder {
 
     /// Brings the trajectories of `key`, the one that was taken last, up to the newest late pose.
     /// Returns whether they changed.
-    pub fn catch_up(
-        &mut self,
-        pool: &ThreadPool,
-        key: &mut KeyFrame,
-        older: Option<&KeyFrame>,
-    ) -> bool {
+    pub fn catch_up(&mut self, pool: &ThreadPool, key: &mut KeyFrame, past: Past<'_>) -> bool {
         let is_new = std::mem::take(&mut self.is_late_new) && !key.displacement.data().is_empty();
-        let late = if is_new { self.late_world(key) } else { None };
+        let older = past[0];
+        let late = if is_new { self.late_world(key, older) } else { None };
         if late.is_none() {
             return false;
         }
         self.models.late = late;
-        self.fill(pool, key, older);
+        self.fill(pool, key, past);
         true
     }
 
     /// The camera's way from `key` to the late pose.
-    fn late_world(&self, key: &KeyFrame) -> Option<World> {
+    fn late_world(&self, key: &KeyFrame, older: Option<&KeyFrame>) -> Option<World> {
+        self.world(key, older, &self.path.towards(&self.late?)?)
+    }
+
+    /// The world of `key`, after `older`, as the camera goes `onward`, where depth, cameras and
+    /// times tell it.
+    fn world(&self, key: &KeyFrame, older: Option<&KeyFrame>, onward: &Onward) -> Option<World> {
         let is_newest = |pose: &&Pose| pose.time == key.content_time;
         self.path.newest().filter(is_newest)?;
         let span = key.motion_span().filter(|_| !key.depth.data().is_empty())?;
-        let older = self.camera_at(key, key.motion_from?)?;
-        World::new(key, &older, &self.path.towards(&self.late?)?, span)
+        let camera = self.camera_at(key, key.motion_from?)?;
+        let oldest = older.and_then(|older| self.camera_at(older, older.motion_from?));
+        World::new(key, &camera, oldest.as_ref(), onward, span)
     }
 
-    /// Takes in what `key` shows of the predictions of `older`, which its motion points back to.
-    fn weigh(
-        &mut self,
-        pool: &ThreadPool,
-        key: &KeyFrame,
-        new: &Models,
-        older: Option<&KeyFrame>,
-        before: Option<&KeyFrame>,
-    ) {
-        let older = older.filter(|older| !older.displacement.data().is_empty());
-        let quadratic = older.zip(before).and_then(|(older, before)| Quadratic::new(older, before));
+    /// Takes in what `key` shows of the predictions of the key that its motion points back to, if
+    /// that is the newest of `past`.
+    fn weigh(&mut self, pool: &ThreadPool, key: &KeyFrame, new: &Models, past: Past<'_>) {
+        let [older, before, first] = past;
+        let older = older.filter(|older| {
+            key.motion_from == Some(older.content_time) && !older.displacement.data().is_empty()
+        });
+        let quadratic = older.and_then(|older| Quadratic::new(older, before?, first));
         let models = &mut self.models;
         if let Some(older) = older.filter(|_| models.lacks_lattice) {
             models.lattice.update(pool, older, &models.grid);
@@ -242,7 +246,7 @@ impl Ladder {
     }
 
     /// Works out what the rungs need of `key`, but for the lattice and what is fitted to it.
-    fn prepare(&mut self, key: &KeyFrame) -> Models {
+    fn prepare(&mut self, key: &KeyFrame, older: Option<&KeyFrame>) -> Models {
         // Their buffers go round: those of the key before last are taken over.
         let mut models = std::mem::take(&mut self.spare);
         models.grid = Grid::of(key);
@@ -255,7 +259,8 @@ impl Ladder {
         };
         models.global = if uses_global { Homography::fit(key, &models.grid) } else { None };
         if !matches!(self.choice, Choice::Always(_)) {
-            models.worlds = self.worlds(key);
+            models.worlds =
+                CameraOrder::ALL.map(|order| self.world(key, older, &self.path.onward(order)?));
         }
         models
     }
@@ -284,27 +289,16 @@ impl Ladder {
         }
     }
 
-    /// The camera's ways on from `key`, where depth, cameras and times tell them.
-    fn worlds(&self, key: &KeyFrame) -> [Option<World>; CameraOrder::ALL.len()] {
-        CameraOrder::ALL.map(|order| {
-            let is_newest = |pose: &&Pose| pose.time == key.content_time;
-            self.path.newest().filter(is_newest)?;
-            let span = key.motion_span().filter(|_| !key.depth.data().is_empty())?;
-            let older = self.camera_at(key, key.motion_from?)?;
-            World::new(key, &older, &self.path.onward(order)?, span)
-        })
-    }
-
     /// The camera at the time that the motion of `key` points back to.
     fn camera_at(&self, key: &KeyFrame, time: MonoTime) -> Option<Camera> {
         self.path.at(time).map(|pose| pose.camera).or(key.motion_from_camera)
     }
 
     /// Fills in velocity and acceleration of `key`.
-    fn fill(&mut self, pool: &ThreadPool, key: &mut KeyFrame, older: Option<&KeyFrame>) {
+    fn fill(&mut self, pool: &ThreadPool, key: &mut KeyFrame, past: Past<'_>) {
         let one_for_all = match self.choice {
             Choice::Always(rung) => Some(rung),
-            Choice::World => Some(Rung::World(self.evidence.order())),
+            Choice::World => Some(Rung::World(self.evidence.mover_order())),
             Choice::Evidence if self.models.late.is_some() => None,
             Choice::Evidence => self.evidence.rung_of_all(),
         };
@@ -318,7 +312,7 @@ impl Ladder {
             key.acceleration.resize(0, 0);
             return;
         }
-        let quadratic = older.and_then(|older| Quadratic::new(key, older));
+        let quadratic = past[0].and_then(|older| Quadratic::new(key, older, past[1]));
         let [width, height] = self.models.grid.cells;
         self.velocity.resize(width, height);
         self.acceleration.resize(width, height);
@@ -408,7 +402,7 @@ fn fill_mixed(filling: &Filling<'_>, evidence: &Evidence, run: Run<'_>) {
     let cells = (run.x..).zip(run.velocity.iter_mut().zip(run.acceleration));
     for (x, (velocity, acceleration)) in cells {
         let lead = if models.is_led_by_late_camera(key, x, run.y) {
-            Lead::by(Rung::World(evidence.order()))
+            Lead::by(Rung::World(MoverOrder::Constant))
         } else {
             let depth = if has_depth { key.depth.at(x, run.y) } else { 0 };
             evidence.lead_at(x, run.y, depth)

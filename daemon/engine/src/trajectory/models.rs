@@ -14,7 +14,7 @@ use super::grid::Grid;
 use super::lattice::Lattice;
 use super::quadratic::Quadratic;
 use super::rung::Rung;
-use super::world::World;
+use super::world::{MoverOrder, World};
 use crate::key::KeyFrame;
 
 /// What the rungs need of one key beside its planes.
@@ -28,6 +28,8 @@ pub struct Models {
     pub(super) affine: AffineField,
     /// By [`CameraOrder`].
     pub(super) worlds: [Option<World>; CameraOrder::ALL.len()],
+    /// How the camera is taken to go on.
+    pub(super) order: CameraOrder,
     /// Where the key's motion does not explain its picture, and what does.
     pub(super) failed: FailedField,
     /// With the camera on its way to a late pose, which takes the place of every order.
@@ -70,10 +72,10 @@ impl Models {
         self.affine.fit(pool, &self.lattice, &self.grid, wanted);
     }
 
-    /// The model of a camera order: that of the late pose, where there is one.
+    /// The world as the camera is taken to go on: to the late pose, where there is one.
     #[must_use]
-    pub fn world(&self, order: CameraOrder) -> Option<&World> {
-        self.late.as_ref().or(self.worlds[order as usize].as_ref())
+    pub fn world(&self) -> Option<&World> {
+        self.late.as_ref().or(self.worlds[self.order as usize].as_ref())
     }
 
     /// Whether a rung was prepared, so that it may have answers.
@@ -101,6 +103,23 @@ impl Models {
         self.affine.curve_by_own(&self.grid, [x, y], depth, key.displacement.at(x, y))
     }
 
+    /// Where the surface of a cell goes as the camera goes on by `order`; None where no camera
+    /// tells.
+    #[must_use]
+    #[inline(always)]
+    pub fn curve_by(
+        &self,
+        order: CameraOrder,
+        key: &KeyFrame,
+        older: Option<&Quadratic<'_>>,
+        x: u32,
+        y: u32,
+    ) -> Option<Curve> {
+        let world = self.worlds[order as usize].as_ref()?;
+        let curve = world.curve(MoverOrder::Constant, key, older, &self.grid, [x, y]);
+        Some(curve).filter(Curve::is_known)
+    }
+
     /// Whether a late pose says where the surface of a cell goes on to: it moves with the world.
     #[inline(always)]
     pub(super) fn is_led_by_late_camera(&self, key: &KeyFrame, x: u32, y: u32) -> bool {
@@ -126,8 +145,8 @@ impl Models {
             Rung::Global => self.global.map(|global| global.curve(grid.centre(x, y))),
             Rung::Affine => self.affine.curve(key, grid, x, y),
             Rung::Quadratic => older.and_then(|older| older.curve(key, grid, x, y)),
-            Rung::World(order) => {
-                self.world(order).map(|world| world.curve(key, older, grid, x, y))
+            Rung::World(movers) => {
+                self.world().map(|world| world.curve(movers, key, older, grid, [x, y]))
             }
             Rung::Flow => self.failed.at(grid.centre(x, y)).map(Curve::straight),
         };

@@ -1,6 +1,6 @@
 //! The rungs of the ladder, by name.
 
-use super::camera_path::CameraOrder;
+use super::world::MoverOrder;
 
 /// A model of how a surface goes on from a key, cheapest first.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
@@ -16,8 +16,8 @@ pub enum Rung {
     Affine,
     /// It goes on by the change of its motion.
     Quadratic,
-    /// It is seen by a camera that goes on.
-    World(CameraOrder),
+    /// It is seen by a camera that goes on, and goes on through the world itself if it moves.
+    World(MoverOrder),
     /// It goes on by what the last two pictures show of it, where its motion does not explain them.
     Flow,
 }

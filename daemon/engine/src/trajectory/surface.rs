@@ -74,6 +74,22 @@ impl Around {
         best.1
     }
 
+    /// The depth key of `key` here, from the cells on the surface of depth key `depth`: between
+    /// them on a plane, as the inverse of distance is linear in the picture.
+    #[must_use]
+    #[inline(always)]
+    #[expect(clippy::cast_precision_loss, reason = "24 bits of depth are enough")]
+    pub fn depth(&self, key: &KeyFrame, depth: u32) -> Option<f32> {
+        let (mut weights, mut sum) = (0.0, 0.0);
+        for (x, y, weight) in self.cells {
+            if weight > 0.0 && is_on(key, x, y, Some(depth)) {
+                weights += weight;
+                sum += weight * key.depth.at(x, y) as f32;
+            }
+        }
+        (weights > 0.0).then(|| sum / weights)
+    }
+
     /// The motion of `key` here, from the cells on the surface of depth key `depth` whose motion is
     /// known.
     #[must_use]

@@ -6,22 +6,26 @@
 //! ```text
 //! (1) m    = D - c'(x)                       motion of its own, in the picture; D the motion field
 //! (2) d(p) = c(x, p) + m p                   where m is small: it stands still, give or take
-//! (3) h(p) = h + (h - h') p                  where it is not: h = w (x, y, 1), h' of its place then
+//! (3) h(p) = h + v p + a p^2 / 2             where it is not: h = w (x, y, 1), h' of its place then
 //!     d(p) = c(h(p), p)
+//! (4) v = h - h',  a = 0                     first order
+//! (5) a = 2 (h - h' - (h' - h") / r) / (1 + r),  v = h - h' + a / 2          second; h" before that
 //! ```
 //!
 //! A still point has m = 0 and follows the camera's path alone. One that moves goes on through the
-//! world at constant velocity, (3): its place one span ago comes from where it was in the older
-//! picture and the depth that the older key has there. h, a pixel scaled by its distance, is linear
-//! in the place, so that no matrix has to be undone. Where the older key shows no such surface the
-//! point goes on along its motion vector. Where the field knows no motion a point is taken to be
+//! world, (3), at constant velocity or at constant acceleration ([`MoverOrder`]): its place one span
+//! ago comes from where it was in the older picture and the depth that the older key has there, the
+//! place before that from the older key's own motion and the oldest key's depth, r spans earlier.
+//! h, a pixel scaled by its distance, is linear in the place, so that no matrix has to be undone.
+//! Where the older key shows no such surface the point goes on along its motion vector, where the
+//! oldest shows none at constant velocity. Where the field knows no motion a point is taken to be
 //! still; and so is the background where nothing was drawn (depth key 0), which engines leave
 //! without vectors.
 
-use super::camera_path::{Onward, Reprojection};
+use super::camera_path::{Onward, Reprojection, between};
 use super::curve::{Curve, Curves};
 use super::grid::Grid;
-use super::quadratic::Quadratic;
+use super::quadratic::{Been, Quadratic};
 use crate::key::{Camera, KeyFrame};
 use crate::lanes::both;
 use crate::time::MonoSpan;
@@ -30,6 +34,21 @@ use crate::time::MonoSpan;
 /// motion and depth of real engines are off.
 const STILL_PX: f32 = 0.25;
 
+/// How what moves on its own goes on through the world.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
+pub enum MoverOrder {
+    /// At constant velocity (4).
+    #[default]
+    Constant,
+    /// At constant acceleration (5).
+    Accelerated,
+}
+
+impl MoverOrder {
+    /// Every order, simplest first.
+    pub const ALL: [Self; 2] = [Self::Constant, Self::Accelerated];
+}
+
 /// The camera's motion around one key.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct World {
@@ -37,6 +56,8 @@ pub struct World {
     older: Reprojection,
     /// And back.
     from_older: Reprojection,
+    /// From the picture of the key before the older one.
+    from_oldest: Option<Reprojection>,
     /// Until phases 1/2 and 1.
     half: Reprojection,
     one: Reprojection,
@@ -46,32 +67,40 @@ pub struct World {
 
 impl World {
     /// Of `key`, which has depth and a camera, as the camera goes `onward` from it. `older` is the
-    /// camera at the time that its motion points back to, `span` before. None where its projection
+    /// camera at the time that its motion points back to, `span` before, and `oldest` the one at the
+    /// time that the motion of that key points back to, if it is known. None where its projection
     /// tells no distance.
     #[must_use]
-    pub fn new(key: &KeyFrame, older: &Camera, onward: &Onward, span: MonoSpan) -> Option<Self> {
+    pub fn new(
+        key: &KeyFrame,
+        older: &Camera,
+        oldest: Option<&Camera>,
+        onward: &Onward,
+        span: MonoSpan,
+    ) -> Option<Self> {
         let camera = key.camera.as_ref()?;
         let per_depth_key = key.inverse_distance_per_depth_key?;
         Some(Self {
-            older: super::camera_path::between(camera, older, key.valid)?,
-            from_older: super::camera_path::between(older, camera, key.valid)?,
+            older: between(camera, older, key.valid)?,
+            from_older: between(older, camera, key.valid)?,
+            from_oldest: oldest.and_then(|oldest| between(oldest, camera, key.valid)),
             half: onward.reprojection(key.valid, span.scale(1, 2))?,
             one: onward.reprojection(key.valid, span)?,
             per_depth_key,
         })
     }
 
-    /// (2) or (3) of a cell; `older` reads the key before. NaN where the point is not in front of
+    /// (2) or (3) of a cell; `older` reads the keys before. NaN where the point is not in front of
     /// the camera.
     #[must_use]
     #[inline(always)]
     pub fn curve(
         &self,
+        movers: MoverOrder,
         key: &KeyFrame,
         older: Option<&Quadratic<'_>>,
         grid: &Grid,
-        x: u32,
-        y: u32,
+        [x, y]: [u32; 2],
     ) -> Curve {
         let at = grid.centre(x, y);
         let depth = key.depth.at(x, y);
@@ -85,21 +114,46 @@ impl World {
                 one: [one[0] - at[0] + own[0], one[1] - at[1] + own[1]],
             };
         }
-        let before = older.and_then(|older| older.depth_before(at, displacement, depth));
-        let Some(before) = before.filter(|before| *before > 0) else {
+        let was = older.and_then(|older| older.been(at, displacement, depth));
+        let Some((was, past)) = was.filter(|was| was.depth > 0.0).zip(older) else {
             return Curve::straight(displacement);
         };
-        let was = [at[0] - displacement[0], at[1] - displacement[1]];
-        let then = self.from_older.scaled(was, self.inverse_distance(before));
         let now = [at[0] / q, at[1] / q, 1.0 / q];
+        let then = self.from_older.scaled(was.at, was.depth * self.per_depth_key);
+        let change = match movers {
+            MoverOrder::Constant => None,
+            MoverOrder::Accelerated => self.change(past, &was, now, then),
+        };
+        let [v, a] =
+            change.unwrap_or_else(|| [std::array::from_fn(|i| now[i] - then[i]), [0.0; 3]]);
         let seen = |by: &Reprojection, p: f32| {
-            let part = |i: usize| now[i] + (now[i] - then[i]) * p;
+            let part = |i: usize| now[i] + v[i] * p + 0.5 * a[i] * p * p;
             let [x, y, w] = [part(0), part(1), part(2)];
             let w = if w > 0.0 { w } else { f32::NAN };
             let place = by.place([x / w, y / w], 1.0 / w);
             [place[0] - at[0], place[1] - at[1]]
         };
         Curve { half: seen(&self.half, 0.5), one: seen(&self.one, 1.0) }
+    }
+
+    /// v and a of (5) of a point that is at `now` and was at `then`, seen at `was`. None where the
+    /// oldest key does not show it.
+    #[inline(always)]
+    fn change(
+        &self,
+        past: &Quadratic<'_>,
+        was: &Been,
+        now: [f32; 3],
+        then: [f32; 3],
+    ) -> Option<[[f32; 3]; 2]> {
+        let from_oldest = self.from_oldest.as_ref()?;
+        let before = past.been_before(was).filter(|before| before.depth > 0.0)?;
+        let earlier = from_oldest.scaled(before.at, before.depth * self.per_depth_key);
+        let r = past.ratio();
+        let a: [f32; 3] = std::array::from_fn(|i| {
+            ((now[i] - then[i]) - (then[i] - earlier[i]) / r) * (2.0 / (1.0 + r))
+        });
+        Some([std::array::from_fn(|i| now[i] - then[i] + 0.5 * a[i]), a])
     }
 
     /// (2) of `N` cells from (`x`, `y`) on; None where one of them moves on its own.
