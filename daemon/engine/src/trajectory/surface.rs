@@ -75,11 +75,14 @@ impl Around {
     }
 
     /// The depth key of `key` here, from the cells on the surface of depth key `depth`: between
-    /// them on a plane, as the inverse of distance is linear in the picture.
+    /// them on a plane, as the inverse of distance is linear in the picture. None without depth.
     #[must_use]
     #[inline(always)]
     #[expect(clippy::cast_precision_loss, reason = "24 bits of depth are enough")]
     pub fn depth(&self, key: &KeyFrame, depth: u32) -> Option<f32> {
+        if key.depth.data().is_empty() {
+            return None;
+        }
         let (mut weights, mut sum) = (0.0, 0.0);
         for (x, y, weight) in self.cells {
             if weight > 0.0 && is_on(key, x, y, Some(depth)) {
