@@ -224,6 +224,26 @@ fn what_comes_nearer_ever_faster_goes_on_to_where_it_will_be() {
 }
 
 #[test]
+fn a_key_without_depth_takes_no_part_in_how_movers_go_on() {
+    for without in 0..7 {
+        let keys =
+            approaching(|index| 20.0 - 0.7 * index as f32).enumerate().map(|(index, key)| {
+                let depth =
+                    if index == without { plane(0, 0, |_, _| 0) } else { key.depth.clone() };
+                KeyFrame { depth, ..key }
+            });
+        let (_, last) = climbed(Method::World, keys);
+        let expected = (110.0 - 59.5) * ((20.0 - 0.7 * 6.0) / (20.0 - 0.7 * 7.0) - 1.0);
+        let (velocity, acceleration) = (last.velocity.at(110, 44), last.acceleration.data());
+        let bend = acceleration.get(44 * SIZE[0] as usize + 110).map_or(0.0, |a| f32::from(a.x));
+        let goes = (f32::from(velocity.x) + 0.5 * bend) / 32.0;
+        // Without the depth of one of the last two keys it goes on along its motion vector.
+        let bound = if without < 5 { 0.06 } else { 0.3 };
+        assert!((goes - expected).abs() < bound, "without {without}: {expected}, found {goes}");
+    }
+}
+
+#[test]
 fn a_late_camera_leads_what_moves_with_the_world_and_the_newest_pose_wins() {
     let steady = |index: i64| camera(0.0, 0.5 * index as f64);
     for method in [Method::World, Method::Auto] {

@@ -174,4 +174,18 @@ mod tests {
             prop_assert_eq!(nearest_cell(&key, &grid, position, depth), slowly);
         }
     }
+
+    #[test]
+    fn depth_between_the_cells_is_that_of_their_surface_alone_and_none_without_a_depth_plane() {
+        let depth = |x, _| if x < 3 { 1000 + 10 * x } else { 9000 };
+        let key =
+            KeyFrame { valid: Rect::full(4, 4), depth: plane(4, 4, depth), ..KeyFrame::default() };
+        let at = |x| Around::new(&Grid::of(&key), [x, 1.5]).unwrap();
+        let found = at(1.25).depth(&key, 1000).unwrap();
+        assert!((found - 1012.5).abs() < 1e-3, "on a plane, between its cells: {found}");
+        assert_eq!(at(2.5).depth(&key, 1000), Some(1020.0), "beside something nearer");
+        assert_eq!(at(2.5).depth(&key, 9000), Some(9000.0));
+        assert_eq!(at(1.25).depth(&key, 90_000), None);
+        assert_eq!(at(1.25).depth(&KeyFrame::default(), 1000), None);
+    }
 }
