@@ -118,8 +118,8 @@ impl Ladder {
     }
 
     /// Gives `key` its trajectories. It was decoded with its displacement; `past` are the keys
-    /// before it, of which the first is left out where it is a cut. `flow` looks at the pictures
-    /// where motion was not estimated from them already.
+    /// before it: none where it is a cut. `flow` looks at the pictures where motion was not
+    /// estimated from them already.
     pub fn take_key(
         &mut self,
         pool: &ThreadPool,
